@@ -14,11 +14,11 @@ import numpy as np
 
 from shapeprog.formats.format import format_of
 from shapeprog.formats.frames import placement
-from shapeprog.formats.parts import exact_scene
 from shapeprog.geometry.mesh import solids_of
 from shapeprog.geometry.primitives import primitives
 from shapeprog.language.program import Program
 from shapeprog.language.unit import METRES
+from shapeprog.language.unroll import exact_scene
 from shapeprog.space import FloatArray, Frame
 
 FINEST = 1e-4  # metres to which sizes are rounded

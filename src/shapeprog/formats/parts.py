@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +14,7 @@ from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.geometry.mesh import joined, part_meshes, triangle_normals, union_mesh
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
-from shapeprog.language.tensors import encode
-from shapeprog.language.unroll import on_numpy_if_shipped, unroll
-from shapeprog.lazy_torch import torch
+from shapeprog.language.unroll import exact_scene
 from shapeprog.space import Frame
 
 Vertices = npt.NDArray[np.float64]
@@ -45,13 +42,6 @@ class Part:
     block: int
     vertices: Vertices
     faces: Faces
-
-
-@contextmanager
-def exact_scene(program: Program) -> Iterator[Any]:
-    """What a program draws, in double precision; without torch for statements that ship."""
-    with on_numpy_if_shipped(program):
-        yield unroll(encode(program, dtype=torch.float64))
 
 
 def parts(program: Program, frame: Frame | None = None) -> list[Part]:

@@ -7,8 +7,8 @@ counts, turns and ids are discrete and carry none.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from jaxtyping import Bool, Float, Int
@@ -56,6 +56,13 @@ def unroll(program: Program | Sequence[Program] | Code, *, shortest: float = 0.0
 def on_numpy_if_shipped(program: Program) -> AbstractContextManager[None]:
     """Draw without torch within, if it is not loaded yet and every statement of a program comes with the package."""
     return on_numpy(all(language()[node.name].ships for node in program.walk()))
+
+
+@contextmanager
+def exact_scene(program: Program) -> Iterator[Scene]:
+    """What a program draws, in double precision; without torch for statements that ship."""
+    with on_numpy_if_shipped(program):
+        yield unroll(encode(program, dtype=torch.float64))
 
 
 def draw_blocks(code: Code) -> Int[Tensor, "*batch K 32 32"]:

@@ -33,10 +33,8 @@ from shapeprog.language.merging import merged_lines
 from shapeprog.language.parameters import shortest, to_float32
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.program import Program
-from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
-from shapeprog.language.unroll import on_numpy_if_shipped, unroll
-from shapeprog.lazy_torch import torch
+from shapeprog.language.unroll import exact_scene
 from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 
 EMPTY = 0.1
@@ -152,8 +150,7 @@ def _in_own_cells(lines: tuple[Line, ...], up: float = 0.0, depth: float = 0.0) 
 
 def _bounds(program: Program) -> tuple[FloatArray, FloatArray]:
     """The low and high corner (3,) in cells of the box around the parts of a program; zeros if it has none."""
-    with on_numpy_if_shipped(program):
-        scene = unroll(encode(program, dtype=torch.float64))
+    with exact_scene(program) as scene:
         mask, centre, reach = array(scene.mask), array(scene.centre), array(scene.reach)
     if not mask.any():
         return np.zeros(3), np.zeros(3)

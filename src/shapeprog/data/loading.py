@@ -63,14 +63,11 @@ def load(
         metres(unit)
     file, index = _split_index(path)
     held = _open(file, up, front, points, seed)
-    if index is None:
-        if len(held) != 1:
-            raise InputError(
-                f"{file.name} holds {len(held)} shapes",
-                f"choose one, as in {file.name}#0, or read them all with load_all",
-            )
-        return replace(held[0], unit=unit)
-    return replace(held[_number(file, index, held)], unit=unit)
+    if index is None and len(held) != 1:
+        cure = f"choose one, as in {file.name}#0, or read them all with load_all"
+        raise InputError(f"{file.name} holds {len(held)} shapes", cure)
+    number = 0 if index is None else _number(file, index, held)
+    return replace(held[number], unit=unit)
 
 
 load_shape = load  # its name in ``shapeprog``, whose ``load`` reads programs

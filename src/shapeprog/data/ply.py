@@ -96,28 +96,33 @@ def _rows(name: str, element: _Element, body: bytes, at: int) -> tuple[dict[str,
     """The columns of an element by name, each as its numbers and how many belong to each row, and where it ends."""
     check_count(name, f"{element.name} rows", element.count, 3 * POINTS)
     lists = [listed for listed in element.properties if listed[2] is not None]
-    widths = {} if element.count == 0 else _first_widths(name, element, body, at)
+    if not element.count:
+        return {}, at
+    first, _ = _ragged(name, element, body, at, 1)
+    widths = {label: len(numbers) for label, (numbers, _) in first.items()}
     fields = list[tuple[str, np.dtype[Any]] | tuple[str, np.dtype[Any], tuple[int]]]()
     for label, kind, length in element.properties:
         if length is not None:
-            fields += [(f"{label} length", length), (label, kind, (max(widths.get(label, 0), 0),))]
+            fields += [(f"{label} length", length), (label, kind, (widths[label],))]
         else:
             fields.append((label, kind))
     row = np.dtype(fields)
     if at + element.count * row.itemsize <= len(body):
         table = np.frombuffer(body, row, element.count, at) if row.itemsize else np.zeros(element.count, row)
-        if all((table[f"{label} length"] == widths.get(label)).all() for label, _, _ in lists):
-            full = {label: np.full(element.count, widths.get(label, 1)) for label, _, _ in element.properties}
+        if all((table[f"{label} length"] == widths[label]).all() for label, _, _ in lists):
+            full = {label: np.full(element.count, widths[label]) for label, _, _ in element.properties}
             return {label: (table[label].reshape(-1), full[label]) for label in full}, at + table.nbytes
     if not lists:
         raise _short(name, element)
-    return _ragged(name, element, body, at)
+    return _ragged(name, element, body, at, element.count)
 
 
-def _ragged(name: str, element: _Element, body: bytes, at: int) -> tuple[dict[str, tuple[Array, Array]], int]:
-    """The same where rows differ in length, as those of triangles among quads do."""
+def _ragged(
+    name: str, element: _Element, body: bytes, at: int, count: int
+) -> tuple[dict[str, tuple[Array, Array]], int]:
+    """The same of the first ``count`` rows, which may differ in length, as those of triangles among quads do."""
     columns: dict[str, list[Array]] = {label: [] for label, _, _ in element.properties}
-    for _ in range(element.count):
+    for _ in range(count):
         for label, kind, length in element.properties:
             width = 1
             if length is not None:
@@ -126,20 +131,6 @@ def _ragged(name: str, element: _Element, body: bytes, at: int) -> tuple[dict[st
             at += kind.itemsize * width
     full = {label: (np.concatenate(rows), np.array([*map(len, rows)])) for label, rows in columns.items()}
     return full, at
-
-
-def _first_widths(name: str, element: _Element, body: bytes, at: int) -> dict[str, int]:
-    """How long each list of the first row is."""
-    widths: dict[str, int] = {}
-    for label, kind, length in element.properties:
-        width = 1
-        if length is not None:
-            width = widths[label] = int(_at(name, element, body, at, length, 1)[0])
-            at += length.itemsize
-        at += kind.itemsize * max(width, 0)
-    if at > len(body):
-        raise _short(name, element)
-    return widths
 
 
 def _at(name: str, element: _Element, body: bytes, at: int, kind: np.dtype[Any], count: int) -> Array:

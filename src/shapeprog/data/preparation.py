@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -73,7 +73,6 @@ def prepare(
     seed: int = 0,
     up: str | None = None,
     front: str | None = None,
-    read: Callable[..., Shape] = load,
 ) -> Iterator[Prepared]:
     """Read every model of ``directory`` and write packs ``{category}_{split}.npz``; yields one record per model.
 
@@ -95,8 +94,6 @@ def prepare(
         Parts of the shapes that go to train, val and test.
     points, seed, up, front
         As for :func:`shapeprog.data.load`.
-    read
-        The function that reads a model.
 
     Raises
     ------
@@ -119,7 +116,7 @@ def prepare(
             done += 1
             problem: ShapeProgError | None = None
             try:
-                shape = read(path, up=up, front=front, points=points, seed=seed)
+                shape = load(path, up=up, front=front, points=points, seed=seed)
             except ShapeProgError as error:
                 problem = error
                 failures.append((path, error))

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import InputError
-from shapeprog.space import RESOLUTION, Array
+from shapeprog.space import HALF, RESOLUTION, Array
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -56,7 +56,7 @@ def voxelise_mesh(vertices: Array, faces: Array, resolution: int = RESOLUTION) -
     return touched
 
 
-def voxelise_points(points: Array, resolution: int = RESOLUTION) -> BoolArray:
+def voxelise_points(points: Array) -> BoolArray:
     """Every cell that holds a point, and those that the points enclose, (R, R, R).
 
     Views along the six axes are stopped by the cells with points, and by holes between them no wider than about four
@@ -66,19 +66,17 @@ def voxelise_points(points: Array, resolution: int = RESOLUTION) -> BoolArray:
     ----------
     points
         Positions (P, 3) in the grid frame.
-    resolution
-        Cells along each side.
     """
     from scipy.spatial import cKDTree
 
-    positions = np.asarray(points, np.float64) + resolution / 2
-    touched = np.zeros((resolution,) * 3, np.bool_)
+    positions = np.asarray(points, np.float64) + HALF
+    touched = np.zeros((RESOLUTION,) * 3, np.bool_)
     # A point on the last boundary of the shape belongs to the shape's last cell: pulled in by a hair.
     inner = positions + SHRINK * np.sign(positions.mean(0) - positions) * (
         np.abs(positions - np.rint(positions)) < 1e-4
     )
     cells = np.floor(inner).astype(np.int64)
-    cells = cells[((cells >= 0) & (cells < resolution)).all(1)]
+    cells = cells[((cells >= 0) & (cells < RESOLUTION)).all(1)]
     touched[tuple(cells.T)] = True
     some = positions[:: max(1, len(positions) // 2000)]
     distance, _ = cKDTree(positions).query(some, k=[min(2, len(positions))])
@@ -87,7 +85,7 @@ def voxelise_points(points: Array, resolution: int = RESOLUTION) -> BoolArray:
     return touched
 
 
-def resample_voxels(voxels: Array, low: Array, scale: float, resolution: int = RESOLUTION) -> BoolArray:
+def resample_voxels(voxels: Array, low: Array, scale: float) -> BoolArray:
     """Every cell of the grid that an occupied cell of another grid reaches, (R, R, R).
 
     A finer cell reaches the cell that holds its centre, as in the packs; a coarser one every cell that it touches.
@@ -102,13 +100,13 @@ def resample_voxels(voxels: Array, low: Array, scale: float, resolution: int = R
         Side of one of its cells in cells of the grid.
     """
     reduced = np.asarray(voxels, np.bool_)
-    for axis, corner in enumerate(np.asarray(low, np.float64) + resolution / 2):
+    for axis, corner in enumerate(np.asarray(low, np.float64) + HALF):
         start = corner + np.arange(reduced.shape[axis]) * scale
         margin = scale / 2 if scale < 1 else SHRINK  # all of a finer cell is drawn together into its centre
         first = np.floor(start + margin)
         last = np.maximum(np.ceil(start + scale - margin) - 1, first)
         # The cells that reach cell k lie side by side, and which they are does not depend on the other axes.
-        numbers = np.arange(resolution)
+        numbers = np.arange(RESOLUTION)
         spans = zip(np.searchsorted(last, numbers), np.searchsorted(first, numbers, side="right"), strict=True)
         layers = np.moveaxis(reduced, axis, 0)
         reduced = np.moveaxis(np.stack([layers[begin:end].any(0) for begin, end in spans]), 0, axis)

@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeprog.geometry.dispatch import bound, cells, excess
 from shapeprog.kernels.compile import helper, kernel
-from shapeprog.kernels.rows import clip, enclose, fill_row, stretch
+from shapeprog.kernels.rows import enclose, fill_row, stretch
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, SIZE, WIDTH, in_axes
 
 SQUARE = 1e-6  # how far an entry of a rotation may be from 0 or 1 and still count as a right angle
@@ -37,11 +37,7 @@ def _fill_turned(table, row, planes, plane, low, high):
         x = i + 0.5 - table[row, CENTRE]
         for j in range(low[1], high[1]):
             y = j + 0.5 - table[row, CENTRE + 1]
-            start, stop = stretch(table, row, half, x, y, reach)
-            if start > stop:
-                continue
-            first = max(clip(np.floor(start + side - 0.5), resolution), low[2])
-            last = min(clip(np.ceil(stop + side + 0.5), resolution), high[2])
+            first, last = stretch(table, row, half, i, j, reach, resolution, low, high)
             while first < last and _excess(table, row, x, y, first + 0.5 - side) > 0:
                 first += 1
             while first < last and _excess(table, row, x, y, last - 0.5 - side) > 0:

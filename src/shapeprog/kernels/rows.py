@@ -59,16 +59,20 @@ def enclose(table, row, half, resolution, low, high):
 
 
 @helper
-def stretch(table, row, half, x, y, reach):
-    """Where along left-right the row of cells through (x, y) can be inside the local box, relative to the centre."""
-    low, high = -reach - 1e-6, reach + 1e-6
+def stretch(table, row, half, i, j, reach, resolution, low, high):
+    """The cells of row (i, j), the last excluded, that can be inside a turned box; see :func:`enclose`."""
+    x, y, side = i + 0.5 - table[row, CENTRE], j + 0.5 - table[row, CENTRE + 1], table[row, CENTRE + 2]
+    start, stop = -reach - 1e-6, reach + 1e-6
     for axis in range(3):
-        start = table[row, ROTATION + axis] * x + table[row, ROTATION + 3 + axis] * y
+        at = table[row, ROTATION + axis] * x + table[row, ROTATION + 3 + axis] * y
         slope = table[row, ROTATION + 6 + axis]
         if abs(slope) < 1e-12:
-            if abs(start) > half[axis] + 1e-9:
-                return 1.0, -1.0
+            if abs(at) > half[axis] + 1e-9:
+                return 0, 0
         else:
-            first, second = (-half[axis] - start) / slope, (half[axis] - start) / slope
-            low, high = max(low, min(first, second)), min(high, max(first, second))
-    return low, high
+            first, second = (-half[axis] - at) / slope, (half[axis] - at) / slope
+            start, stop = max(start, min(first, second)), min(stop, max(first, second))
+    if start > stop:
+        return 0, 0
+    near, far = np.floor(start + side - 0.5), np.ceil(stop + side + 0.5)
+    return max(clip(near, resolution), low[2]), min(clip(far, resolution), high[2])

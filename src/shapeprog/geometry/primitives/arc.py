@@ -20,8 +20,8 @@ from shapeprog.geometry.formulas import Four, Number, Triple
 from shapeprog.geometry.primitive import Mesh, Primitive
 from shapeprog.geometry.primitives.frustum import SEGMENTS, tube
 from shapeprog.kernels.compile import helper
-from shapeprog.kernels.rows import clip, enclose, fill_row, stretch
-from shapeprog.kernels.table import CENTRE, SIZE, local
+from shapeprog.kernels.rows import enclose, fill_row, stretch
+from shapeprog.kernels.table import SIZE, local
 from shapeprog.lazy_torch import torch
 from shapeprog.space import Array, FloatArray
 
@@ -172,15 +172,9 @@ def cells_kernel(table: Array, row: int, square: bool, planes: Array, plane: int
     reach = enclose(table, row, box, resolution, low, high)
     if not math.isfinite(reach):
         return True
-    middle = table[row, CENTRE + 2]
     for i in range(low[0], high[0]):
         for j in range(low[1], high[1]):
-            x, y = i + 0.5 - table[row, CENTRE], j + 0.5 - table[row, CENTRE + 1]
-            small, far = stretch(table, row, box, x, y, reach)
-            if small > far:
-                continue
-            k = max(clip(np.floor(small + middle - 0.5), resolution), low[2])
-            last = min(clip(np.ceil(far + middle + 0.5), resolution), high[2])
+            k, last = stretch(table, row, box, i, j, reach, resolution, low, high)
             while k < last:
                 a, b, c = local(table, row, i + 0.5, j + 0.5, k + 0.5)
                 away = distance_kernel(table, row, a, b, c)

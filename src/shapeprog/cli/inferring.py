@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
 FOLDER = Path("shapeprog-out")
 
 TIPPED = (".stl", ".ply", ".off", ".xyz")  # formats that do not store the up axis
-
-
-class Written(NamedTuple):
-    """A shape, what was inferred from it, and the names of the files."""
-
-    shape: Shape
-    result: Result
-    names: list[str]
 
 
 def infer_command(
@@ -87,15 +79,15 @@ def infer_command(
     )  # fmt: skip
     folder, stems, units = make_folder(out), set[str](), set[str]()
 
-    def inferred(shape: Shape, progress: Callable[[str, float], None]) -> Written:
-        shape = replace(shape, unit=file_unit or "")
+    def inferred(shape: Shape, progress: Callable[[str, float], None]) -> tuple[Result, list[str]]:
+        """What was inferred from a shape, and the names of the files."""
         result = measured(inference(shape, progress=progress), shape, seed)
         stem = free_stem(shape, stems, folder)
         names = write(result, shape, folder, stem)
         if not no_picture:
             picture(shape, result.program, folder / f"{stem}.png", scores=result.scores)
             names.append(f"{stem}.png")
-        return Written(shape, result, names)
+        return result, names
 
     failures: list[tuple[Path, ShapeProgError]] = []
     count = 0
@@ -105,7 +97,8 @@ def infer_command(
                 try:
                     if isinstance(shape, ShapeProgError):
                         raise shape
-                    written = inferred(shape, begin(shape.name))
+                    shape = replace(shape, unit=file_unit or "")
+                    result, names = inferred(shape, begin(shape.name))
                 except OutputError:  # a disk that took nothing now takes nothing later
                     raise
                 except ShapeProgError as error:
@@ -116,10 +109,10 @@ def infer_command(
                     continue
                 count += 1
                 if as_json:
-                    about = {"name": written.shape.name, "folder": str(folder), "seconds": written.result.seconds}
-                    terminal.print_json(about | json.loads(document(written.result, written.shape)))
+                    about = {"name": shape.name, "folder": str(folder), "seconds": result.seconds}
+                    terminal.print_json(about | json.loads(document(result, shape)))
                 elif not terminal.quiet:
-                    _report(written, folder, up is None, units)
+                    _report(shape, result, names, folder, up is None, units)
     except OutputError as error:
         raise OutputError(error.message, f"{error.hint}; {_kept(count, folder)}") from None
     except KeyboardInterrupt:
@@ -147,13 +140,12 @@ def _kept(count: int, folder: Path) -> str:
     return f"finished results are kept: {count} program{'s' if count != 1 else ''} in {folder}"
 
 
-def _report(written: Written, folder: Path, default_up: bool, units: set[str]) -> None:
+def _report(shape: Shape, result: Result, names: list[str], folder: Path, default_up: bool, units: set[str]) -> None:
     """Print a result; ``units`` are those that have been assumed, each of which is reported once."""
     from shapeprog.data.orientation import default_axes
     from shapeprog.data.placement import SCAN
     from shapeprog.view.page import scores_text
 
-    shape, result, names = written
     console = terminal.output()
     console.print(shape.name, style="bold")
     if shape.kind != "mesh":

@@ -13,7 +13,7 @@ from shapeprog.language.placement import AXES
 NOTHING = 2e-6  # cells; a length up to this is none
 EVEN = 1e-4  # degrees by which the copies of a rotation may miss a full circle
 
-Triple: TypeAlias = tuple[Linear, Linear, Linear]
+Triple: TypeAlias = tuple[Linear, ...]
 """Along x, y and z, measured from the middle of the whole."""
 
 Cost: TypeAlias = tuple[int, int]
@@ -30,6 +30,10 @@ class Span(NamedTuple):
     def middle(self) -> Linear:
         """Its middle."""
         return self.low + self.size / 2.0
+
+
+Spans: TypeAlias = tuple[Span, ...]
+"""A box, by its intervals along x, y and z."""
 
 
 class Forms:

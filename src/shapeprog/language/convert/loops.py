@@ -8,7 +8,7 @@ from dataclasses import replace
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Call, Draw, Function, Group, Keywords, Line, Loop, Part, Point, Source
 from shapeprog.language.builtin import CELL_CENTRE
-from shapeprog.language.convert.forms import EVEN, NOTHING, Span, cost
+from shapeprog.language.convert.forms import EVEN, NOTHING, Spans, cost
 from shapeprog.language.convert.parts import Converted, Parts, from_corner, ordered
 from shapeprog.language.expression import Binary, Expression, Linear, Value
 from shapeprog.language.merging import separate_loops
@@ -43,7 +43,7 @@ class Loops(Parts):
             same = first is not None and all(middle is not None and self._zero(first - middle) for middle in following)
             middles.append(first if same else None)
         first_box = drawing[0].first if drawing else None
-        return Converted(tuple(line for result in drawing for line in result.lines), first_box, tuple(middles))  # type: ignore[arg-type]
+        return Converted(tuple(line for result in drawing for line in result.lines), first_box, tuple(middles))
 
     def _call(self, line: Call) -> Converted:
         """A call, whose first arguments in cells are its box."""
@@ -94,16 +94,16 @@ class Loops(Parts):
             result = self.line(inner)
             middle = result.middles[axis]
             if middle is not None and self.number(middle - plane) > NOTHING:
-                before, shift = self.shift, list(self.shift)
-                shift[axis] = shift[axis] + (plane - middle) * 2.0
-                self.shift = shift[0], shift[1], shift[2]
+                before = self.shift
+                away = (plane - middle) * 2.0
+                self.shift = tuple(by + away if index == axis else by for index, by in enumerate(before))
                 result = self.line(inner)
                 self.shift = before
             results.append(result)
         body = self._joined(results)
         middles = tuple(plane if index == axis else middle for index, middle in enumerate(body.middles))
         group = Group("mirror", self._single(axis, plane), body.lines)
-        return Converted((group,), body.first, middles)  # type: ignore[arg-type]
+        return Converted((group,), body.first, middles)
 
     def _translate(self, body: Converted, line: Loop) -> Converted:
         """A loop with fixed steps, a row, or a mirror, whichever is shortest; a row where the count is a name.
@@ -129,16 +129,16 @@ class Loops(Parts):
             ways = {axis: by[axis] * float(1 if number is None else number - 1) for axis in moving}
             options.append(Group("row", (("last", self._last(body.first, ways)),), body.lines, written))
         best = min(options, key=lambda group: cost(group.keywords))
-        result = Converted((best,), body.first, moved)  # type: ignore[arg-type]
+        result = Converted((best,), body.first, moved)
         if number == 2 and len(moving) == 1 and (middle := body.middles[moving[0]]) is not None:
             mirror = self._mirror(line.body, moving[0], middle + by[moving[0]] / 2.0 - self.shift[moving[0]])
             group = mirror.lines[0]
             assert isinstance(group, Group)
             if cost(group.keywords) < cost(best.keywords):
-                return mirror._replace(middles=moved)  # type: ignore[arg-type]
+                return mirror._replace(middles=moved)
         return result
 
-    def _last(self, first: tuple[Span, Span, Span], ways: Mapping[int, Linear]) -> Point:
+    def _last(self, first: Spans, ways: Mapping[int, Linear]) -> Point:
         """The best keywords for the last copy of a row, which is so far from the first along each axis."""
         last: list[tuple[str, Value]] = []
         for axis, way in ways.items():

@@ -11,7 +11,7 @@ import numpy as np
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Argument, Draw, Keywords, Line, Part
 from shapeprog.language.builtin import ARM_HALF_WIDTH, CELL_CENTRE
-from shapeprog.language.convert.forms import Cost, Forms, Span, Triple, cost
+from shapeprog.language.convert.forms import Cost, Forms, Span, Spans, Triple, cost
 from shapeprog.language.expression import Linear
 from shapeprog.language.lowering import SMALLEST
 from shapeprog.language.placement import AXES, SIZES
@@ -30,8 +30,8 @@ class Converted(NamedTuple):
     """
 
     lines: tuple[Line, ...]
-    first: tuple[Span, Span, Span] | None = None
-    middles: tuple[Linear | None, Linear | None, Linear | None] = (None, None, None)
+    first: Spans | None = None
+    middles: tuple[Linear | None, ...] = (None, None, None)
 
 
 class Parts(Forms):
@@ -77,20 +77,15 @@ class Parts(Forms):
                 raise ShapeProgError(f"{name} has no placed form", "keep this program as statements in cells")
         if any(self._draws_nothing(span.size) for span in spans):
             return Converted(())
-        x, y, z = (Span(span.low + by, span.size) for span, by in zip(spans, self.shift, strict=True))
-        return self._box(kind, (x, y, z), keywords, role, straight)
+        moved = tuple(Span(span.low + by, span.size) for span, by in zip(spans, self.shift, strict=True))
+        return self._box(kind, moved, keywords, role, straight)
 
     def _box(
-        self,
-        kind: str,
-        spans: tuple[Span, Span, Span],
-        keywords: Keywords,
-        role: str,
-        straight: tuple[bool, bool, bool] = (True, True, True),
+        self, kind: str, spans: Spans, keywords: Keywords, role: str, straight: Sequence[bool] = (True, True, True)
     ) -> Converted:
         placed = [pair for axis, span in enumerate(spans) for pair in self.interval(axis, span)]
         middles = tuple(span.middle if is_straight else None for span, is_straight in zip(spans, straight, strict=True))
-        return Converted((Part(kind, (*placed, *keywords), role),), spans, middles)  # type: ignore[arg-type]
+        return Converted((Part(kind, (*placed, *keywords), role),), spans, middles)
 
     def _end(self, at: Sequence[Linear]) -> Triple:
         """A point along x, y, z from one along up, depth, side."""
@@ -103,7 +98,7 @@ class Parts(Forms):
             raise ShapeProgError("a part without thickness has no placed form", "make it a little thicker")
         return self.number(size) < 0
 
-    def _arm(self, v: list[Linear]) -> tuple[Span, Span, Span]:
+    def _arm(self, v: list[Linear]) -> Spans:
         """The box of an arm of a cross base."""
         turn = round(self.number(v[5])) % 4
         low, long = v[1:3], v[4]
@@ -124,7 +119,7 @@ class Parts(Forms):
         part = Part("cylinder", (*keywords, *self.interval(2, vertical)), role)
         part = replace(part, keywords=ordered(part.keywords))
         middles = (*middle, vertical.middle)
-        return Converted((part,), spans, middles)  # type: ignore[arg-type]
+        return Converted((part,), spans, middles)
 
     def _upright(
         self, middle: Sequence[Linear], spans: Sequence[Span], radius: Keywords, largest: Linear | None, *, sized: bool
@@ -165,7 +160,7 @@ class Parts(Forms):
         radii = [self.written(radius) for radius in sizes]
         radius: Argument = radii[0] if len(radii) == 1 else (radii[0], radii[1])
         part = Part(kind, (*words, ("radius", radius)), role)
-        result = Converted((part,), first, middles)  # type: ignore[arg-type]
+        result = Converted((part,), first, middles)
         if kind in ("rod", "taper") and straight[0] and straight[1]:
             rises = self.number(end[2] - start[2]) > 0
             if kind == "rod" or rises:
@@ -212,7 +207,7 @@ class Parts(Forms):
         turned = not self._zero(turn)
         middles = tuple(None if turned or not straight[a] else start[a] for a in range(3))
         first = tuple(Span(coordinate, Linear()) for coordinate in start)
-        bar = Converted((Part("bar", keywords, role),), first, middles)  # type: ignore[arg-type]
+        bar = Converted((Part("bar", keywords, role),), first, middles)
         if turned or not all(straight[a] for a in range(3) if a != main):
             return bar
         forward = self.number(end[main] - start[main]) > 0
@@ -220,7 +215,7 @@ class Parts(Forms):
         spans = [Span(low[main], high[main] - low[main])] * 3
         for index, size in across:
             spans[index] = Span(start[index] - size / 2.0, size)
-        return min(bar, self._box("box", (spans[0], spans[1], spans[2]), (), role), key=_cost_of)
+        return min(bar, self._box("box", tuple(spans), (), role), key=_cost_of)
 
 
 def _cost_of(converted: Converted) -> Cost:
@@ -230,14 +225,14 @@ def _cost_of(converted: Converted) -> Cost:
     return operators, words + (part.kind != "box")
 
 
-def from_corner(at: Sequence[Linear], size: Sequence[Linear]) -> tuple[Span, Span, Span]:
+def from_corner(at: Sequence[Linear], size: Sequence[Linear]) -> Spans:
     """A box along x, y, z from its low corner and size along up, depth, side; side points against x."""
     up, depth, side = at
     height, length, width = size
     return Span(-side - width, width), Span(depth, length), Span(up, height)
 
 
-def _on_bottom(at: Sequence[Linear], height: Linear, half_depth: Linear, half_side: Linear) -> tuple[Span, Span, Span]:
+def _on_bottom(at: Sequence[Linear], height: Linear, half_depth: Linear, half_side: Linear) -> Spans:
     low = [at[0], at[1] - half_depth, at[2] - half_side]
     return from_corner(low, [height, half_depth * 2.0, half_side * 2.0])
 

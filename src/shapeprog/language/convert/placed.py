@@ -73,8 +73,7 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True, floor: fl
         middle[axes] = (low + high)[axes] / 2
     reach = np.maximum(high - middle, middle - low)
     sizes = [to_float32(float(f"{2 * reach[axis]:.7g}")) or 1.0 for axis in (SIDE, DEPTH, UP)]
-    forms = [Linear(float(shortest(size))) for size in sizes]
-    converter = Loops((forms[0], forms[1], forms[2]), {}, {})
+    converter = Loops(tuple(Linear(float(shortest(size))) for size in sizes), {}, {})
     converter.rows = rows
     converter.shift = Linear(), Linear(-float(middle[DEPTH])), Linear(-float(middle[UP]))
     body = with_joined_mirrors(converter.lines(program.body).lines)

@@ -109,7 +109,7 @@ def measure(task: Task) -> dict[str, Any]:
     """The row of one object."""
     import torch
 
-    from shapeprog.evaluation.editing import edit_scores
+    from benchmarks.editing import edit_scores
     from shapeprog.evaluation.likeness import Triangles
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.evaluation.parts import part_scores

@@ -7,11 +7,12 @@ import trimesh
 from geometry_helpers import make_scene, random_scene
 
 import shapeprog as sp
+from benchmarks.editing import gaps
 from shapeprog.data.random import random_program
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import mesh
 from shapeprog.geometry.contacts import TOUCHING, contact_groups
-from shapeprog.geometry.mesh import gaps, part_meshes, pieces, pieces_of_parts, union_mesh
+from shapeprog.geometry.mesh import part_meshes, pieces, pieces_of_parts, union_mesh
 from shapeprog.geometry.primitives import primitives
 
 

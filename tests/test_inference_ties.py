@@ -13,8 +13,8 @@ import torch
 from typer.testing import CliRunner
 
 import shapeprog as sp
+from benchmarks.editing import edit_scores
 from shapeprog.cli.app import app
-from shapeprog.evaluation.editing import edit_scores
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import evidence_of_program

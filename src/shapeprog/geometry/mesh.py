@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -184,25 +183,6 @@ def pieces(vertices: Array, faces: Array) -> int:
 
 def _count(solid: Any) -> int:
     return sum(piece.volume() > 0 for piece in solid.decompose())
-
-
-def gaps(scene: Batch, within: float) -> dict[tuple[int, int], float]:
-    """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap."""
-    parts = part_meshes(scene)
-    if len(parts) < 2:
-        return {}
-    low, high = (np.array([corner(part.vertices, 0) for part in parts]) for corner in (np.min, np.max))
-    straight = [bool(((p.vertices == a) | (p.vertices == b)).all()) for p, a, b in zip(parts, low, high, strict=True)]
-    solid = cache(lambda index: manifold(parts[index].vertices, parts[index].faces))
-    between = np.linalg.norm(
-        np.maximum(low[:, None] - high, low - high[:, None]).clip(0), axis=-1
-    )  # those of the boxes
-    near, results = between <= within, {}
-    for i, j in np.argwhere(np.triu(near, 1)).tolist():
-        gap = between[i, j] if straight[i] and straight[j] else solid(i).min_gap(solid(j), 2 * within)
-        if gap < within:
-            results[parts[i].slot, parts[j].slot] = float(gap)
-    return results
 
 
 def triangle_normals(vertices: FloatArray, faces: Array) -> tuple[FloatArray, FloatArray]:

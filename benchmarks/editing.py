@@ -18,6 +18,7 @@ not have them to begin with.
 from __future__ import annotations
 
 from collections.abc import Set
+from functools import cache
 from itertools import product
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ import torch
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.mesh import gaps, pieces, union_mesh
+from shapeprog.geometry.mesh import manifold, part_meshes, pieces, union_mesh
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.free import free_numbers, multiplied
@@ -107,6 +108,23 @@ def _contacts(scene: Scene) -> Set[tuple[int, int]]:
         return gaps(scene, TOUCHING).keys()
     except ShapeProgError:  # a part lies too far away to be measured
         return frozenset()
+
+
+def gaps(scene: Scene, within: float) -> dict[tuple[int, int], float]:
+    """The distance between primitives of one scene, for pairs of slots nearer than ``within``; 0 where they overlap."""
+    parts = part_meshes(scene)
+    if len(parts) < 2:
+        return {}
+    low, high = (np.array([corner(part.vertices, 0) for part in parts]) for corner in (np.min, np.max))
+    straight = [bool(((p.vertices == a) | (p.vertices == b)).all()) for p, a, b in zip(parts, low, high, strict=True)]
+    solid = cache(lambda index: manifold(parts[index].vertices, parts[index].faces))
+    between = np.linalg.norm(np.maximum(low[:, None] - high, low - high[:, None]).clip(0), axis=-1)  # of the boxes
+    results = {}
+    for i, j in np.argwhere(np.triu(between <= within, 1)).tolist():
+        gap = between[i, j] if straight[i] and straight[j] else solid(i).min_gap(solid(j), 2 * within)
+        if gap < within:
+            results[parts[i].slot, parts[j].slot] = float(gap)
+    return results
 
 
 def _mirrored(scene: Scene) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.expression import Expression, Value, names_in, value_at
@@ -130,6 +130,7 @@ class Function:
 
 
 Line: TypeAlias = Comment | Assignment | Draw | Loop | Part | Group | Call | Function
+Some = TypeVar("Some", bound=Line)
 
 
 @dataclass(frozen=True)
@@ -244,7 +245,7 @@ def with_values(line: Line, new_values: Iterable[Value]) -> Line:
     return changed_values(line, lambda _: next(new))
 
 
-def changed_values(line: Line, change: Callable[[Value], Value]) -> Line:
+def changed_values(line: Some, change: Callable[[Any], Any]) -> Some:
     """The line with a change made to each number and expression, in the order of its text."""
     match line:
         case Draw() | Loop():
@@ -285,7 +286,7 @@ def names_of(source: Source) -> set[str]:
     return {*source.numbers}.union(*(function.names for function in source.functions.values()))
 
 
-def changed_lines(lines: Iterable[Line], change: Callable[[Line], Line]) -> tuple[Line, ...]:
+def changed_lines(lines: Iterable[Some], change: Callable[[Some], Some]) -> tuple[Some, ...]:
     """The lines with a change made to each of them, and then to those inside of it."""
     result = []
     for line in map(change, lines):

@@ -6,11 +6,11 @@ import importlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 from shapeprog.language.ast import Draw as Draw
 from shapeprog.language.ast import Loop as Loop
-from shapeprog.language.ast import Scale, Source
+from shapeprog.language.ast import Scale, Source, changed_lines, changed_values
 from shapeprog.language.unit import Unit
 
 PUBLISHED_DEPTH = 3  # steps of one block in the published generator
@@ -94,7 +94,7 @@ class Program:
 
     def snap(self) -> Program:
         """The program with every number rounded half to even to a whole one, as published executors do."""
-        return Program(tuple(_snap(node) for node in self.body))
+        return Program(changed_lines(self.body, partial(changed_values, change=lambda value: float(round(value)))))
 
 
 def nest(chain: Chain) -> Node:
@@ -112,10 +112,3 @@ def _chains(node: Node, *loops: Loop) -> Iterator[Chain]:
     else:
         for inner in node.body:
             yield from _chains(inner, *loops, Loop(node.name, node.values, ()))
-
-
-def _snap(node: Node) -> Node:
-    values = tuple(float(round(value)) for value in node.values)
-    if isinstance(node, Draw):
-        return Draw(node.name, values, node.role)
-    return Loop(node.name, values, tuple(_snap(inner) for inner in node.body))

@@ -11,20 +11,20 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import Call, Function, Source
+from shapeprog.language.ast import Call, Function, Source, changed_lines, changed_values
 from shapeprog.language.convert import call_in_cells
 from shapeprog.language.dimensions import counted_names
 from shapeprog.language.expression import Linear, Value, value_at
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
-from shapeprog.language.program import Loop, Node, Program
+from shapeprog.language.program import Node, Program
 from shapeprog.library.blocks import Block, Kind, blocks_of
 from shapeprog.library.independence import independent
 from shapeprog.library.length import terms, written
@@ -176,7 +176,8 @@ class Pattern:
 
     def drawn(self, numbers: Mapping[str, float]) -> tuple[Node, ...]:
         """Its statements with these numbers; raises a ``ShapeProgError`` as :meth:`nodes` does."""
-        return tuple(_at(node, numbers) for node in self.nodes(numbers))
+        at_numbers = partial(changed_values, change=lambda value: to_float32(_linear(value).at(numbers)))
+        return changed_lines(self.nodes(numbers), at_numbers)
 
     def forms_at(self, numbers: Mapping[str, float]) -> tuple[Form, ...]:
         """The forms of its blocks at these numbers, one for each parameter; empty if not linear in its measures."""
@@ -184,13 +185,6 @@ class Pattern:
             return tuple(form for (form,) in forms(self.nodes(numbers), numbers, self.measures))
         except (ShapeProgError, ZeroDivisionError):
             return ()
-
-
-def _at(node: Node, numbers: Mapping[str, float]) -> Node:
-    """A statement or loop with the values of its linear forms."""
-    values = (to_float32(_linear(value).at(numbers)) for value in node.values)
-    node = replace(node, values=tuple(values))
-    return replace(node, body=tuple(_at(inner, numbers) for inner in node.body)) if isinstance(node, Loop) else node
 
 
 def _key(forms: Sequence[Form]) -> tuple[tuple[Kind, bytes, bytes], ...]:

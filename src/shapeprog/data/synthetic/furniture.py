@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from shapeprog.data.synthetic import sketched_cases as cases
 from shapeprog.data.synthetic import sketched_seating as seating
 from shapeprog.data.synthetic.sketch import Sketch, tidy
 from shapeprog.geometry.mesh import part_meshes
+from shapeprog.language.ast import changed_lines
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.statement import language
@@ -63,7 +65,8 @@ def furniture(number: int, seed: int = 0, measures: int | None = None) -> Progra
     shift = -(low + high) / 2
     if any(isinstance(node, Loop) and node.name == "rotate" for node in program.walk()):
         shift[UP + 1 :] = 0  # rotated copies stay centred on the axis of the grid
-    return Program(tuple(_moved(node, [tidy(value) for value in shift.tolist()]) for node in program.body))
+    moved = partial(_moved, shift=[tidy(value) for value in shift.tolist()])
+    return Program(changed_lines(program.body, moved))
 
 
 def _bounds(program: Program) -> tuple[FloatArray, FloatArray]:
@@ -72,7 +75,7 @@ def _bounds(program: Program) -> tuple[FloatArray, FloatArray]:
 
 
 def _moved(node: Node, shift: list[float]) -> Node:
-    """The node with all its places moved, the planes of mirrors too."""
+    """The node with its own places moved, the planes of mirrors too."""
     quantities = language()[node.name].quantities
     axes = [int(value) for value, quantity in zip(node.values, quantities, strict=True) if quantity.kind == "axis"]
     along = itertools.cycle([shift[axis] for axis in axes] or shift)
@@ -80,6 +83,4 @@ def _moved(node: Node, shift: list[float]) -> Node:
         to_float32(tidy(value + next(along))) if quantity.kind == "position" else value
         for value, quantity in zip(node.values, quantities, strict=True)
     )
-    if isinstance(node, Loop):
-        return Loop(node.name, values, tuple(_moved(inner, shift) for inner in node.body))
     return replace(node, values=values)

@@ -148,4 +148,4 @@ def _changed(program: Program, change: Callable[[tuple[int, int], float], float]
         n = next(counter)
         return replace(node, values=tuple(change((n, slot), value) for slot, value in enumerate(node.values)))
 
-    return Program(changed_lines(program.body, changed))  # type: ignore[arg-type]
+    return Program(changed_lines(program.body, changed))

@@ -9,12 +9,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from shapeprog.language.placement import BOX_IN_CELLS
 from shapeprog.library.blocks import Kind, Slot
-from shapeprog.space import DEPTH, SIDE, UP, FloatArray
+from shapeprog.space import AXES, DEPTH, SIDE, UP, FloatArray
 
-EXTENTS = ("height", "depth", "width")
-LOW = ("bottom", "front", "left")
-AXIS = ("up", "depth", "side")
+LOW, EXTENTS = BOX_IN_CELLS[:3], BOX_IN_CELLS[3:]
 
 THIN = 0.6
 """A solid is thin along an axis where it measures less than this share of the next longer."""
@@ -210,7 +209,7 @@ def _boxed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: Float
             word = "thickness"
         yield word, "length", axis, size, 1.0 + 0.1 * axis
         yield LOW[axis], "place", axis, low, 2.0
-        yield f"middle_{AXIS[axis]}", "middle", axis, low + span / 2, 4.0
+        yield f"middle_{AXES[axis]}", "middle", axis, low + span / 2, 4.0
         yield f"{LOW[axis]}_end", "place", axis, low + span, 5.0
         if axis in repeats:
             yield f"inner_{LOW[axis]}", "place", axis, low + size, 6.0
@@ -235,7 +234,7 @@ def _pointed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: Flo
                 heights[slot.word] = row
                 yield "bottom" if slot.word in ("start", "at") else f"{slot.word}_up", "place", UP, row, 2.0
             else:
-                yield f"{end}_at_{AXIS[slot.axis]}", "place", slot.axis, row, 3.0
+                yield f"{end}_at_{AXES[slot.axis]}", "place", slot.axis, row, 3.0
         elif slot.kind == "length":
             numbered[slot.word] += 1
             word = {"size": EXTENTS[slot.axis]}.get(slot.word, slot.word)
@@ -253,7 +252,7 @@ def _pointed(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: Flo
         yield "height" if rising else "rise", "length", UP, heights["end"] - heights["start"], 1.5
     for index, (axis, way) in enumerate(kind.repeats, first):
         if way == "mirror":
-            yield f"middle_{AXIS[axis]}", "middle", axis, factors[index], 4.0
+            yield f"middle_{AXES[axis]}", "middle", axis, factors[index], 4.0
         else:
             yield EXTENTS[axis], "length", axis, factors[index], 0.5
 

@@ -13,10 +13,8 @@ LOOKS = {
 }  # fmt: skip
 """Adjectives for solids; a box has none."""
 
-SOLIDS = {
-    "cuboid": "", "cylinder": "cylinders", "rod": "rods", "taper": "tapers", "bent_rod": "bent_rods",
-    "board": "boards", "bar": "bars", "rounded_box": "cushions",
-}  # fmt: skip
+SOLIDS = {"cuboid": "", "rounded_box": "cushions"}
+"""Solids in the plural that are not called as they are."""
 
 PLACES = {
     ((2, "pair"),): "left_and_right", ((1, "pair"),): "front_and_rear", ((0, "pair"),): "below_and_above",

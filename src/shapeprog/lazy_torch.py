@@ -11,7 +11,7 @@ import importlib
 import math
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from contextvars import ContextVar
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -95,7 +95,6 @@ _ALIKE = (
 )  # fmt: skip
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in _ALIKE},
-    "as_tensor": np.asarray,
     "atan2": np.arctan2,
     "cat": np.concatenate,
     "diag_embed": lambda diagonal: diagonal[..., None] * np.eye(diagonal.shape[-1]),
@@ -109,8 +108,7 @@ _NUMPY = SimpleNamespace(
     **{name: _of_tensors(function) for name, function in _FUNCTIONS.items()},
     linalg=SimpleNamespace(cross=_of_tensors(np.linalg.cross)),
     nn=SimpleNamespace(functional=SimpleNamespace(one_hot=_one_hot)),
-    is_grad_enabled=lambda: False, no_grad=nullcontext,
-    bool=np.bool_, long=np.int64, float32=np.float32, float64=np.float64, nan=math.nan, pi=math.pi,
+    is_grad_enabled=lambda: False, long=np.int64, float32=np.float32, float64=np.float64, pi=math.pi,
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from shapeprog.language.ast import Assignment, Call, Draw, Function, Group, Line, Loop, Part, body_of, values
-from shapeprog.language.expression import Binary, Expression, Negative, Value
+from shapeprog.language.expression import Binary, Negative, Value
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
@@ -57,7 +57,7 @@ def _written(line: Draw | Loop) -> int:
         values = line.values[parameter.slots]
         silent = parameter.unsaid is not None and values == (parameter.unsaid,)
         if parameter.quantity.written_out and not silent:
-            total += sum(terms(value) if isinstance(value, Expression) else 1 for value in values)
+            total += sum(map(terms, values))
     return total
 
 

@@ -125,10 +125,11 @@ def _box(group: Group, typical: FloatArray, leaning: bool) -> FloatArray | None:
 
 def _across(kind: Kind, slots: Sequence[Slot], factors: FloatArray, values: FloatArray) -> dict[int, FloatArray]:
     """The thickness of a part between two points along the axes across its direction."""
-    across = sorted({UP, *_leaning(slots, values)} if _leaning(slots, values) != {DEPTH, SIDE} else {DEPTH, SIDE})
+    leaning = _leaning(slots, values)
     thick = [row for slot, row in zip(slots, factors, strict=True) if slot.word in ("section", "radius")]
-    if not thick or not _leaning(slots, values):
+    if not thick or not leaning:
         return {}
+    across = sorted(leaning if leaning == {DEPTH, SIDE} else {UP, *leaning})
     return {axis: thick[index] if kind.shape == "bar" else 2 * thick[0] for index, axis in enumerate(across)}
 
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.language.ast import Draw, Function, Line, Loop, Source, values
-from shapeprog.language.expression import Binary, Expression, Linear, Name, Value
+from shapeprog.language.ast import Draw, Function, Line, Loop, Source, used_names
+from shapeprog.language.expression import Binary, Linear, Name, Value
 from shapeprog.language.placement import BOX_IN_CELLS, RESERVED
 from shapeprog.language.statement import language
 from shapeprog.library.blocks import PAIR, Kind, solid_of
@@ -65,10 +65,7 @@ def function(name: str, group: Group, made: Basis, draws: Sequence[tuple[str, st
         factors = made.factors[start : start + len(slots)]
         start += len(slots)
         lines.append(_block(kind, factors, made.names, waiting, statement, role))
-    used = {
-        name.name for line in Source(tuple(lines)).walk() for value in values(line)
-        if isinstance(value, Expression) for name in value.names()
-    }  # fmt: skip
+    used = used_names(Source(tuple(lines)).walk())
     required = len(made.names) - made.openings
     box: list[tuple[str, float | None]] = [(word, None) for word in BOX_IN_CELLS]
     needed = [(word, None) for k, word in enumerate(made.names) if len(box) <= k < required and word in used]

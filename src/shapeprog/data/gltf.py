@@ -38,7 +38,7 @@ def read_gltf(name: str, content: bytes, read_other: Callable[[str], bytes]) -> 
         Name of the file, for errors.
     content
         The file, GLB or JSON.
-    beside
+    read_other
         Returns the bytes of another file that it refers to.
 
     Raises
@@ -80,7 +80,7 @@ class _Document:
     def __init__(
         self, name: str, head: dict[str, Any], chunk: bytes | None, read_other: Callable[[str], bytes]
     ) -> None:
-        self.name, self._head, self._chunk, self._beside = name, head, chunk, read_other
+        self.name, self._head, self._chunk, self._read_other = name, head, chunk, read_other
         self._files: dict[str, bytes] = {}
         self._arrays: dict[int, Array] = {}
 
@@ -171,7 +171,7 @@ class _Document:
             return self._chunk
         if uri not in self._files:
             data = uri.startswith("data:")
-            self._files[uri] = base64.b64decode(uri.partition(",")[2]) if data else self._beside(unquote(uri))
+            self._files[uri] = base64.b64decode(uri.partition(",")[2]) if data else self._read_other(unquote(uri))
         return self._files[uri]
 
     def _entry(self, what: str, index: int) -> dict[str, Any]:

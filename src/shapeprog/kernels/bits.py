@@ -32,10 +32,7 @@ def ones(word):
 
 @helper
 def uniform(seed, count):
-    """Number ``count`` of the stream of a seed, uniform in [0, 1): a counter put through the mixer of SplitMix64.
-
-    Its twin in torch is ``tests/twins.py``.
-    """
+    """Number ``count`` of the stream of a seed, uniform in [0, 1): a counter put through the mixer of SplitMix64."""
     word = np.uint64(seed) + np.uint64(count + 1) * np.uint64(GOLDEN)
     word = (word ^ (word >> np.uint64(30))) * np.uint64(FIRST)
     word = (word ^ (word >> np.uint64(27))) * np.uint64(SECOND)

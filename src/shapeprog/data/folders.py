@@ -47,9 +47,5 @@ def files_below(folder: Path, suffixes: Collection[str], skipped: Skipped) -> li
 
     for folder_path, _, names in os.walk(folder, onerror=skip):
         candidates = (Path(folder_path, name) for name in names if os.path.splitext(name)[1].lower() in suffixes)
-        files += [path for path in candidates if not _leads_nowhere(path)]
+        files += [path for path in candidates if not os.path.islink(path) or os.path.exists(path)]
     return sorted(files)
-
-
-def _leads_nowhere(path: Path) -> bool:
-    return os.path.islink(path) and not os.path.exists(path)

@@ -35,7 +35,8 @@ def sample_with_faces(
         Seed of the generator.
     """
     positions, listed = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
-    weight = np.cumsum(np.concatenate([_areas(positions, listed[at : at + _AT_ONCE]) for at in _starts(len(listed))]))
+    starts = range(0, max(len(listed), 1), _AT_ONCE)
+    weight = np.cumsum(np.concatenate([_areas(positions, listed[at : at + _AT_ONCE]) for at in starts]))
     if weight[-1] <= 0:
         weight = np.arange(1.0, len(listed) + 1)
     random = np.random.default_rng(seed).random((count, 3))
@@ -46,10 +47,6 @@ def sample_with_faces(
     root, share = np.sqrt(random[:, 1:2]), random[:, 2:3]
     points: Array = first + root * ((1 - share) * along + share * across)
     return points.astype(np.float32), face
-
-
-def _starts(count: int) -> range:
-    return range(0, max(count, 1), _AT_ONCE)
 
 
 def _areas(vertices: Array, faces: Array) -> Array:

@@ -45,7 +45,7 @@ class Model:
 def of_parts(parts: Sequence[Part]) -> Model:
     """Parts in the colours of their statements."""
     if not parts:
-        return _empty()
+        return Model(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0))
     return Model(
         *joined([(part.vertices, part.faces) for part in parts]),
         np.concatenate(part_normals(parts)),
@@ -117,7 +117,3 @@ def _plain(vertices: Array, faces: Array, normals: Array) -> Model:
     """A model in one colour and one part."""
     colours = np.broadcast_to(np.array(INPUT_COLOUR, np.uint8), (len(faces), 3))
     return Model(vertices, faces, normals, colours, np.zeros(len(faces), np.int64))
-
-
-def _empty() -> Model:
-    return Model(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0))

@@ -27,7 +27,8 @@ TABLE = Program(
 def table():
     scene = unroll(TABLE)
     vertices, faces = union_mesh(scene)
-    return Shape("table", voxels(scene).numpy().astype(bool), vertices=vertices, faces=faces)
+    cells = voxels(scene).numpy().astype(bool)
+    return Shape("table", cells, vertices=vertices.astype(np.float32), faces=faces.astype(np.int32))
 
 
 def moved(program, up):
@@ -56,7 +57,7 @@ def test_distances_are_squared_world_lengths_and_a_cell_is_a_cell(table):
     plate = Program((Draw("locker", (0.0, -6.0, -6.0, 0.0, 12.0, 12.0)),))
     flat = np.random.default_rng(0).uniform(-6, 6, (20000, 3)) * [0, 1, 1]
     for height, f1 in ((0.9, 1.0), (1.1, 0.0)):
-        target = Shape("plate", np.zeros((32, 32, 32), bool), flat + np.array([height, 0, 0]))
+        target = Shape("plate", np.zeros((32, 32, 32), bool), (flat + np.array([height, 0, 0])).astype(np.float32))
         row = evaluate_program(plate, target, points=10000)
         assert row.to_target == pytest.approx(height**2 / 288, rel=0.02)
         assert row.cd == pytest.approx(row.to_target + row.from_target)

@@ -111,7 +111,7 @@ def placement(
         if not unit and chosen.unit != "text":
             return Placement(frame)
         centre = per_cell / frame.scale * np.array(frame.centre)
-        return Placement(Frame.of(per_cell, centre, frame.axes), name)
+        return Placement(Frame.of(per_cell, centre, np.array(frame.axes)), name)
     matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
     centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else np.zeros(3)
     return Placement(Frame.of(per_cell, centre, matrix), name)

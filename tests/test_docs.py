@@ -26,7 +26,7 @@ from shapeprog.formats.format import suffixes
 ROOT = Path(__file__).parents[1]
 README, DOCS = ROOT / "README.md", ROOT / "docs"
 PAGES = ("tutorial", "language", "statements", "names", "units", "formats", "libraries", "extending")
-WHOLE = "width, depth, height = 120, 60, 75"  # examples of the page of the language stand below it
+WHOLE = "width, depth, height = 120, 60, 75"  # first line of the examples on the page of the language
 COMMENT = re.compile(r"^ *# (?!unit: ).*\n|  # .*$", re.MULTILINE)
 BLOCK = re.compile(r"(<!-- not run: [^\n]* -->\n)?^```(sh|python|py)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -75,7 +75,8 @@ def test_the_blocks_of_the_readme_run_and_infer_the_program_that_it_prints(folde
     assert COMMENT.sub("", (folder / "demo-output" / "chair_kenney.shape").read_text(encoding="utf-8")) == found
     tutorial = (DOCS / "tutorial.md").read_text(encoding="utf-8")
     beginning = re.search(r"^```text\n# placed: .*\n((?:.+\n)+?)```$", tutorial, re.MULTILINE)
-    assert beginning and found.startswith(beginning[1])
+    assert beginning
+    assert found.startswith(beginning[1])
     replaced = re.findall(r"^sed 's/(.+?)/.+/'", tutorial, re.MULTILINE)
     assert [found.count(each) for each in replaced] == [1]
 
@@ -94,6 +95,15 @@ def test_the_blocks_of_a_page_run(name, folder):
     run(DOCS / name, folder)
 
 
+@pytest.mark.nightly
+def test_the_page_of_libraries_prints_the_program_that_its_command_writes(folder):
+    page = DOCS / "libraries.md"
+    printed = next(code for language, code in blocks(page) if language == "py")
+    run(page, folder)
+    written = (folder / "demo-output" / "bookcase_kenney_open.shape").read_text(encoding="utf-8")
+    assert COMMENT.sub("", written) == printed
+
+
 @pytest.mark.parametrize("page", [README, *(DOCS / f"{page}.md" for page in PAGES)], ids=lambda page: page.stem)
 def test_the_programs_of_a_page_are_programs(page):
     for language, code in blocks(page):
@@ -104,8 +114,8 @@ def test_the_programs_of_a_page_are_programs(page):
             assert program.source is None or program.source.warnings == ()
 
 
-def test_the_page_of_the_language_says_what_its_examples_stand_below():
-    assert f"stand below `{WHOLE}`" in (DOCS / "language.md").read_text(encoding="utf-8")
+def test_the_page_of_the_language_says_what_the_first_line_of_its_examples_is():
+    assert f"assume this first line: `{WHOLE}`" in (DOCS / "language.md").read_text(encoding="utf-8")
 
 
 def test_the_readme_is_short():

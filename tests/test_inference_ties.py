@@ -741,6 +741,15 @@ def test_of_two_clearances_of_several_roles_the_larger_is_the_inner_one():
     }
 
 
+def test_the_second_point_of_a_part_does_not_give_its_bottom():
+    rod = "leg(rod(start=at({side}=a, rear=1), end=at({side}=5, rear=4, bottom=b), radius=1))\n"
+    lines = parsed(rod.format(side="left") + rod.format(side="right"))
+    known = WHOLE | {"a": 2, "b": 3}
+    assert named(lines, {"a": 2, "b": 3}, known) == {"a": "leg_inset", "b": "leg_end_bottom"}
+    lines = parsed(rod.format(side="left") + "shelf(bottom=b, height=1)\nseat(top=9, height=a)\n")
+    assert named(lines, {"b": 3}, known) == {"b": "shelf_bottom"}
+
+
 def test_no_name_is_used_once():
     for text in (TABLE, CABINET):
         source = source_of(sp.parse(tied_text(text)))

@@ -38,6 +38,11 @@ class Misfit:
         Minimum weight (P,) of a squared move of every number.
     seed
         Of the pairs of points that are drawn.
+
+    Attributes
+    ----------
+    together
+        Weights (C,) of the squared gap at each joint.
     """
 
     def __init__(self, layout: Layout, evidence: Evidence, joints: Joints, minimum: FloatArray, seed: int) -> None:
@@ -48,6 +53,7 @@ class Misfit:
         self.reach: FloatArray = np.maximum(scale, 1.0)  # cells that the surface moves for one unit of every number
         prior = np.maximum([PRIOR[slot.kind] for slot in layout.slots], minimum)
         angles = np.array([slot.kind == "angle" for slot in layout.slots])
+        self.together: FloatArray = np.full(len(joints.pairs), TIES.together)
         self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
 
     def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:
@@ -58,7 +64,7 @@ class Misfit:
         slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))
         if joined and len(self.joints.pairs):
             gaps = needs(poses.scene, poses.slopes, moved(poses.scene, self.joints))
-            wide = TIES.together * gaps.slopes
+            wide = torch.from_numpy(self.together[:, None]) * gaps.slopes
             slope = slope + (wide.T @ gaps.residual).numpy()
             curvature = curvature + (wide.T @ gaps.slopes).numpy()
         return slope + self.prior * (numbers - self.layout.numbers), curvature + np.diag(self.prior)

@@ -22,7 +22,8 @@ class TieSettings:
     lost: float = 0.03  # largest decrease of closeness when numbers are tied
     cheaper: float = 3.0  # divides the price of a number where more is lost
     attempts: int = 3  # most prices
-    untied: int = 6  # most times at one price that lines which ties separate are untied
+    repeats: int = 6  # most times at one price that parts are tied which come apart,
+    heavier: float = 10.0  # each time with so many times the weight of their joints
 
     # Price of the number that a relation saves, as a multiple of the usual price
     floor: float = 6.0  # a part that ends just above the floor

@@ -209,8 +209,10 @@ def _candidates(uses: Sequence[Use], numbers: dict[str, float]) -> tuple[list[st
     elif len(roles) > 1 and kind not in ("drop", "bottom", "offset"):
         shared = ["board_width"] if kind in SIZES else [kind]
         shared += ["board_thickness"] if kind == "thickness" else []
-    own = [f"{role}_{kind}" for role, _ in roles.most_common()]
-    own += [f"{use.role}_{quantities[use]}" for use in selected]
+    # The second point of a part is not where the part is: the upper end of a leg is no ``leg_bottom``.
+    plain = [use for use in selected if use.point not in ("through", "end")]
+    own = [f"{role}_{kind}" for role, _ in Counter(use.role for use in plain).most_common()]
+    own += [f"{use.role}_{quantities[use]}" for use in plain]
     own += [f"{use.role}_{use.point}_{quantities[use]}" for use in selected if use.point]
     return shared, own
 

@@ -37,7 +37,7 @@ from shapeprog.language.merging import merged
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import SIDE, UP, Array, FloatArray
+from shapeprog.space import SIDE, UP, FloatArray
 
 
 def tie(
@@ -113,25 +113,25 @@ class _Ties:
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
         self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
-        parts, pairs = layout.parts, blocks[apart].tolist()
-        self.touching = {(parts[min(pair)], parts[max(pair)]) for pair in pairs}
+        self.joined = np.sort(np.array(layout.parts)[blocks[apart]], 1)  # the lines (C, 2) of each joint
+        self.touching = set(map(tuple, self.joined.tolist()))
         self.loose = self._loose(layout.numbers)
 
     def tied(self, price: float) -> Program:
         """The program tied at a price of a number, in the unit of the misfit.
 
-        Lines that ties separate from the others stay untied, and if this is not enough, those that they touched.
+        Where ties separate lines from the others, the joints of these weigh more, and its numbers are tied again.
         """
-        slots, untied = self.layout.slots, set[int]()
-        for _ in range(TIES.untied):
-            solution, values = self._solved(price, self.fixed | np.array([slot.line in untied for slot in slots]))
+        slots = self.layout.slots
+        self.misfit.together[:] = TIES.together
+        for _ in range(TIES.repeats):
+            solution, values = self._solved(price)
             digits = (DEGREES if slots[k].kind == "angle" else self.decimals for k in solution.free)
             free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
             loose = self._loose(solution.factors @ free) - self.loose
             if not loose:
                 break
-            touched = {line for pair in self.touching if not loose.isdisjoint(pair) for line in pair}
-            untied |= touched if loose <= untied else loose
+            self.misfit.together *= np.where(np.isin(self.joined, [*loose]).any(1), TIES.heavier, 1.0)
         return evaluated(written(self.layout, solution, free, group=not self.fixed.any()))
 
     def _loose(self, numbers: FloatArray) -> set[int]:
@@ -139,13 +139,13 @@ class _Ties:
         scene = self.layout.scene(numbers)
         return {self.layout.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
 
-    def _solved(self, price: float, fixed: Array) -> tuple[Solution, FloatArray]:
-        """The free numbers at a price of a number, and their values (Z,); some numbers (P,) are in no relation."""
+    def _solved(self, price: float) -> tuple[Solution, FloatArray]:
+        """The free numbers at a price of a number, and their values (Z,)."""
         numbers, rows = self.layout.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
             candidates = [
                 relation for relation in relations(self.layout, numbers, self.touching)
-                if not relation.row[fixed].any() and (step > 0 or relation.trust in (TIES.contact, TIES.floor))
+                if not relation.row[self.fixed].any() and (step > 0 or relation.trust in (TIES.contact, TIES.floor))
             ]  # fmt: skip
             candidates, before = [*(Relation(row, math.inf) for row in rows), *candidates], len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)

@@ -125,3 +125,10 @@ def test_gradients_are_finite_everywhere(kind: Primitive, dtype: torch.dtype, si
     for gradient in torch.autograd.grad(total, (points, sizes)):
         assert torch.isfinite(gradient).all()
     assert torch.isfinite(distance).all()
+
+
+def test_scripts_written_for_release_0_1_0_still_import_the_primitives() -> None:
+    from shapeprog.geometry.primitive import primitives as former
+    from shapeprog.geometry.primitives import primitives
+
+    assert former is primitives

@@ -7,6 +7,7 @@ sizes.  It is its own mirror image along local axis 2, so that mirroring a scene
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 import numpy.typing as npt
@@ -146,3 +147,10 @@ def _assigned(line: str, slots: range) -> str:
 def _join(numbers: tuple[Number, ...], like: Tensor) -> Tensor:
     zero = torch.zeros_like(like[..., 0])
     return torch.stack([number if type(number) is type(zero) else zero + number for number in numbers], -1).to(like)
+
+
+def __getattr__(name: str) -> Any:
+    """The tuple ``primitives`` of :mod:`shapeprog.geometry.primitives`, where release 0.1.0 had it."""
+    if name == "primitives":
+        return import_module("shapeprog.geometry.primitives").primitives
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -107,8 +107,10 @@ def test_default_axes_by_format(name, axes):
     assert default_axes(Path(name)) == axes
 
 
-def test_arrays_are_in_grid_axes_already():
+def test_voxels_of_arrays_are_in_grid_axes_already_and_points_are_like_meshes():
     np.testing.assert_array_equal(axes_of(Path("a.npy"), None, None), np.eye(3))
+    assert default_axes(Path("a.npz"), cloud=True) == ("+y", "+z")
+    assert default_axes(Path("a.xyz"), cloud=True) == ("+z", "-y")
 
 
 @pytest.mark.parametrize(("up", "front"), [("+w", "+z"), ("+y", "-y"), ("yy", "+z"), ("", "up")])
@@ -137,7 +139,7 @@ def test_point_clouds(tmp_path, kind):
         np.save(path, points)
     else:
         np.savez(path, points=points, colour=np.zeros(3))
-    shape = load(path, **({"up": "+y", "front": "+z"} if kind in ("npy", "npz") else {}), points=1000)
+    shape = load(path, points=1000)
     wanted = steps_in_grid()
     assert (shape.voxels & wanted).sum() / (shape.voxels | wanted).sum() > 0.93
     assert shape.kind == "points"

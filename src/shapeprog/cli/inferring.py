@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 FOLDER = Path("shapeprog-out")
 
 TIPPED = (".stl", ".ply", ".off", ".xyz")  # formats that do not store the up axis
+ARRAYS = (".npy", ".npz")  # nor do these for points; voxels lie in the grid
 
 
 def infer_command(
@@ -151,9 +152,11 @@ def _report(shape: Shape, result: Result, names: list[str], folder: Path, defaul
     if shape.kind != "mesh":
         kind = f"a point cloud; normals are estimated from up to {SCAN:,} points"
         console.print(f"Read as {'voxels' if shape.points is None else kind}.", style="dim")
-    if default_up and shape.source is not None and shape.source.suffix.lower() in TIPPED:
-        note = f"The format does not store the up axis: {default_axes(shape.source)[0]} is assumed."
-        console.print(f"{note} Another axis: --up +y, or --up auto", style="dim")
+    cloud, suffix = shape.kind == "points", "" if shape.source is None else shape.source.suffix.lower()
+    if default_up and shape.source is not None and suffix in (*TIPPED, *(ARRAYS if cloud else ())):
+        usual = default_axes(shape.source, cloud)[0]
+        note = f"The format does not store the up axis: {usual} is assumed."
+        console.print(f"{note} Another axis: --up {'+y' if usual == '+z' else '+z'}, or --up auto", style="dim")
     terminal.print_program(result.program)
     unit = shape.file_unit or "m"
     if result.program.unit and result.program.unit.name and not shape.states_unit and unit not in units:

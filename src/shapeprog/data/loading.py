@@ -157,19 +157,19 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
     return _Held(path, [name], lambda _: shape)
 
 
-Place = Callable[[Callable[..., Shape]], Shape]
-"""Makes a shape with the requested axes from a function of ``axes``."""
+Place = Callable[..., Shape]
+"""Makes a shape with the requested axes from a function of ``axes``; ``cloud=True`` for points in an array."""
 
 
-def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., Shape]) -> Shape:
+def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., Shape], cloud: bool = False) -> Shape:
     if up != AUTO:
-        return make(axes=axes_of(path, up, front))
-    default_shape = make(axes=axes_of(path, None, front))
+        return make(axes=axes_of(path, up, front, cloud))
+    default_shape = make(axes=axes_of(path, None, front, cloud))
     estimate = find_up(
-        default_shape.voxels, np.array(default_shape.frame.axes), usual=default_axes(path)[0], front=front
+        default_shape.voxels, np.array(default_shape.frame.axes), usual=default_axes(path, cloud)[0], front=front
     )
     note = f"Estimated up axis of the file: {estimate.up} (probability {estimate.probability:.0%})."
-    return replace(make(axes=axes_of(path, estimate.up, front)), note=note)
+    return replace(make(axes=axes_of(path, estimate.up, front, cloud)), note=note)
 
 
 def _read_binvox(path: Path, name: str, make_shape: Place) -> Shape:
@@ -197,7 +197,8 @@ def _open_array(path: Path, name: str, make_shape: Place, points: int, seed: int
         return _Held(path, pack.ids.tolist(), pack.__getitem__)
     array = Hdf5Grids(path) if path.suffix.lower() in (".h5", ".hdf5") else read_array(path)
     if not isinstance(array, Hdf5Grids) and array.ndim == 2:
-        cloud = make_shape(partial(shape_from_points, array, name=name, points=points, seed=seed, source=path))
+        make_cloud = partial(shape_from_points, array, name=name, points=points, seed=seed, source=path)
+        cloud = make_shape(make_cloud, cloud=True)
         return _Held(path, [name], lambda _: cloud)
     names = [name] if len(array) == 1 else [f"{name}#{number}" for number in range(len(array))]
 

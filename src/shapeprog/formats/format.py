@@ -29,7 +29,7 @@ Y_UP: Axes = ("+y", "+z")  # axes of glTF, and of most mesh files
 Z_UP: Axes = ("+z", "-y")  # axes of CAD and of 3D printing
 
 GRID: Axes = ("+x", "-y")
-"""Axes of arrays: axis 0 is up, axis 1 is depth (positive = rear), axis 2 is left-right already."""
+"""Axes of voxels in arrays: axis 0 is up, axis 1 is depth (positive = rear), axis 2 is left-right already."""
 
 
 @dataclass(frozen=True)

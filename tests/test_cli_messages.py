@@ -36,3 +36,55 @@ def test_an_assumed_up_axis_is_told_with_another_one(run: Run, tmp_path: Path, n
 def test_voxels_in_arrays_have_no_other_up_axis(run: Run, tmp_path: Path):
     np.save(tmp_path / "a.npy", np.ones((32, 32, 32), bool))
     assert "up axis" not in run("infer", "a.npy", "--no-picture").out
+
+
+@pytest.mark.usefixtures("quick")
+def test_inputs_of_one_name_are_told_apart_by_their_paths_and_errors_begin_with_them(run: Run, tmp_path: Path):
+    folder = tmp_path / "mixed"
+    (folder / "sub").mkdir(parents=True)
+    for name in ("chair.glb", "chair.ply", "sub/chair.stl"):
+        table(folder / name)
+    (folder / "nan.obj").write_text("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n")
+    (folder / "trunc.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1")
+    cells = np.zeros((2, 32, 32, 32), np.uint8)
+    cells[0, 4:28] = 1
+    cells[1] = 7
+    np.save(folder / "x.npy", cells)
+    ended = run("infer", "mixed", "--out", "res", "--no-picture")
+    headings = [line for line in ended.out.splitlines() if line.startswith("mixed/")]
+    assert headings == ["mixed/chair.glb", "mixed/chair.ply", "mixed/sub/chair.stl", "mixed/x.npy#0"]
+    messages = [line for line in ended.err.splitlines() if line.startswith("error: ")]
+    assert messages[0] == "error: mixed/nan.obj: 1 of 3 positions are not finite numbers"
+    assert messages[1].startswith("error: mixed/trunc.obj is cut short")
+    assert messages[2].startswith("error: mixed/x.npy#1 holds voxels with the value 7")
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_few_points_and_a_line_are_refused_and_what_is_flat_is_told(run: Run, tmp_path: Path):
+    points = np.random.default_rng(0).random((500, 3))
+    np.save(tmp_path / "line.npy", points[:, :1] * [1, 2, 3])
+    np.save(tmp_path / "few.npy", points[:99])
+    (tmp_path / "three.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    ended = run("infer", "line.npy", "few.npy", "three.obj")
+    assert ended.code == 2
+    assert "line.npy is a line: it has extent in one direction only" in ended.err
+    assert "few.npy has no faces and 99 points; a point cloud needs at least 100" in ended.err
+    assert "three.obj has no faces and 3 points" in ended.err
+
+
+@pytest.mark.parametrize("leaning", [0.0, 0.7])
+def test_what_lies_in_one_plane_has_a_note(tmp_path: Path, leaning: float):
+    from shapeprog.data import load as load_shape
+
+    points = np.random.default_rng(0).random((500, 3))
+    plane = points * [1, 1, 0] + points[:, :1] * [0, 0, leaning]
+    np.save(tmp_path / "plane.npy", plane)
+    np.save(tmp_path / "solid.npy", points)
+    corners = "".join(f"v {x} {y} {leaning * x}\n" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    (tmp_path / "square.obj").write_text(f"{corners}f 1 2 3 4\nv 5 5 5\n")
+    for name in ("plane.npy", "square.obj"):
+        assert load_shape(tmp_path / name).note == "The input is flat: all of it lies in one plane."
+        assert load_shape(tmp_path / name, up="auto").note.endswith(
+            "). The input is flat: all of it lies in one plane."
+        )
+    assert not load_shape(tmp_path / "solid.npy").note

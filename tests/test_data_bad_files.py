@@ -267,7 +267,7 @@ def test_extreme_coordinates_end_in_a_shape_or_in_words(tmp_path, low, side):
     rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()] + ["f {} {} {}".format(*f) for f in BOX.faces + 1]
     paths = [
         written(tmp_path / "a.obj", "\n".join(rows)),
-        written(tmp_path / "b.npy", npy(corners)),
+        written(tmp_path / "b.npy", npy(np.tile(corners, (13, 1)))),
         written(tmp_path / "c.binvox", f"#binvox 1\ndim 2 2 2\ntranslate {low} 0 0\nscale {side}\ndata\n\1\x08"),
     ]
     for _, found in load_all(paths):

@@ -113,7 +113,7 @@ def infer_command(
                     about = {"name": shape.name, "folder": str(folder), "seconds": result.seconds}
                     terminal.print_json(about | json.loads(document(result, shape)))
                 elif not terminal.quiet:
-                    _report(shape, result, names, folder, up is None, units)
+                    _report(path, shape, result, names, folder, up is None, units)
     except OutputError as error:
         raise OutputError(error.message, f"{error.hint}; {_kept(count, folder)}") from None
     except KeyboardInterrupt:
@@ -141,14 +141,16 @@ def _kept(count: int, folder: Path) -> str:
     return f"finished results are kept: {count} program{'s' if count != 1 else ''} in {folder}"
 
 
-def _report(shape: Shape, result: Result, names: list[str], folder: Path, default_up: bool, units: set[str]) -> None:
+def _report(
+    path: Path, shape: Shape, result: Result, names: list[str], folder: Path, default_up: bool, units: set[str]
+) -> None:
     """Print a result; ``units`` are those that have been assumed, each of which is reported once."""
     from shapeprog.data.orientation import default_axes
     from shapeprog.data.placement import SCAN
     from shapeprog.view.page import scores_text
 
     console = terminal.output()
-    console.print(shape.name, style="bold")
+    console.print(f"{path}" if shape.name.partition("#")[0] in str(path) else f"{path}: {shape.name}", style="bold")
     if shape.kind != "mesh":
         kind = f"a point cloud; normals are estimated from up to {SCAN:,} points"
         console.print(f"Read as {'voxels' if shape.points is None else kind}.", style="dim")
@@ -163,5 +165,5 @@ def _report(shape: Shape, result: Result, names: list[str], folder: Path, defaul
         units.add(unit)
         console.print(terminal.assumed(shape.frame, unit), style="dim")
     lines = [*scores_text(result.scores | {"seconds": result.seconds}, result.program), result.reason]
-    for line in (*lines, f"Wrote {', '.join(names)} in {folder}; the files keep every digit.", ""):
+    for line in (*lines, f"Wrote {', '.join(names)} in {folder}.", ""):
         console.print(line, style="dim")

@@ -6,6 +6,7 @@ import functools
 import io
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -188,9 +189,13 @@ def finish(failures: Sequence[ShapeProgError]) -> None:
 
 
 def at(path: Path, error: ShapeProgError) -> ShapeProgError:
-    """The error with the file that it is about in front, unless it names it already."""
-    named = str(path) in error.message or path.name in error.message
-    return error if named else ShapeProgError(f"{path}: {error.message}", error.hint)
+    """The error with the path of the file that it is about, in place of the name of that file or shape in front."""
+    if str(path) in error.message:
+        return error
+    stem = re.escape(Path(path.name.partition("#")[0]).stem)
+    named = re.match(rf"{stem}(\.\w+)?(#\w+)?(?=:? )", error.message)
+    message = error.message[named.end() :] if named else f": {error.message}"
+    return ShapeProgError(f"{path}{message}", error.hint)
 
 
 def fault(what: str, error: Exception) -> ShapeProgError:

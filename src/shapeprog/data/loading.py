@@ -169,7 +169,8 @@ def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., S
         default_shape.voxels, np.array(default_shape.frame.axes), usual=default_axes(path, cloud)[0], front=front
     )
     note = f"Estimated up axis of the file: {estimate.up} (probability {estimate.probability:.0%})."
-    return replace(make(axes=axes_of(path, estimate.up, front, cloud)), note=note)
+    shape = make(axes=axes_of(path, estimate.up, front, cloud))
+    return replace(shape, note=f"{note} {shape.note}".rstrip())
 
 
 def _read_binvox(path: Path, name: str, make_shape: Place) -> Shape:

@@ -14,6 +14,12 @@ from shapeprog.space import HALF, LEAST_SIDE, MOST_SIDE, RESOLUTION, SPAN, Array
 SCAN = 20_000
 """Maximum number of points of a cloud that inference uses."""
 
+LEAST_POINTS = 100
+"""Minimum number of points of a cloud: fewer do not show where the surface lies."""
+
+_NO_EXTENT = 1e-12
+"""Share of the largest variance of positions in any direction below which they have no extent in another."""
+
 _NEAREST = 1e-12
 """Minimum longest side of a shape as a share of its distance from the origin: below, float64 cannot resolve cells."""
 
@@ -33,7 +39,7 @@ def shape_from_mesh(
     Raises
     ------
     InputError
-        If it has no faces, no extent, no area, or coordinates that are not finite.
+        If it has no faces, no area, extent in one direction only, or coordinates that are not finite.
     """
     from shapeprog.data.sampling import sample_surface
     from shapeprog.data.voxelise import voxelise_mesh
@@ -55,6 +61,7 @@ def shape_from_mesh(
         faces=np.asarray(faces, np.int32),
         source=source,
         kind="mesh",
+        note=_flatness(corners if everything else corners[used], name),
     )
 
 
@@ -72,15 +79,20 @@ def shape_from_points(
     Raises
     ------
     InputError
-        If there are no points, no extent, or coordinates that are not finite.
+        If there are fewer than :data:`LEAST_POINTS`, extent in one direction only, or coordinates that are not finite.
     """
     from shapeprog.data.voxelise import voxelise_points
 
     frame = _frame(cloud, name, axes)
+    if len(cloud) < LEAST_POINTS:
+        raise InputError(
+            f"{name} has no faces and {len(cloud)} points; a point cloud needs at least {LEAST_POINTS}",
+            "export the model again with its faces, or with more points",
+        )
     placed = frame.to_grid(cloud)
     sample, scan = _some(placed, points, seed), _some(placed, SCAN, seed)
     return Shape(
-        name, voxelise_points(placed), sample, frame, source=source, kind="points",
+        name, voxelise_points(placed), sample, frame, source=source, kind="points", note=_flatness(placed, name),
         scan=scan if len(scan) > len(sample) else None,
     )  # fmt: skip
 
@@ -138,6 +150,15 @@ def _frame(positions: Array, name: str, axes: Array | None) -> Frame:
         count = int((~np.isfinite(positions)).any(1).sum())
         raise InputError(f"{name}: {count} of {len(positions)} positions are not finite numbers", "remove or mend them")
     return _around(positions.min(0), positions.max(0), name, axes)
+
+
+def _flatness(placed: Array, name: str) -> str:
+    """A note if positions in the grid lie in a plane; an ``InputError`` if they lie on a line."""
+    mean = placed.mean(0)
+    thinnest, second, widest = np.linalg.eigvalsh(placed.T @ placed / len(placed) - np.outer(mean, mean))
+    if second < _NO_EXTENT * widest:
+        raise InputError(f"{name} is a line: it has extent in one direction only", "check how it was exported")
+    return "The input is flat: all of it lies in one plane." if thinnest < _NO_EXTENT * widest else ""
 
 
 def _around(low: Array, high: Array, name: str, axes: Array | None) -> Frame:

@@ -41,7 +41,7 @@ class Shape:
     split
         train, val or test, if its pack has splits.
     note
-        A sentence on the estimated up axis, if it was estimated.
+        Sentences on the up axis, if it was estimated, and on a shape that lies in one plane.
     unit
         Unit of its file where somebody has named it: ``mm``, ``cm``, ``m`` or ``in``; else empty.
     """

@@ -88,3 +88,28 @@ def test_what_lies_in_one_plane_has_a_note(tmp_path: Path, leaning: float):
             "). The input is flat: all of it lies in one plane."
         )
     assert not load_shape(tmp_path / "solid.npy").note
+
+
+@pytest.mark.usefixtures("quick")
+def test_infer_replaces_its_own_results_but_no_edited_text_unless_it_may(run: Run, tmp_path: Path):
+    for name in ("one", "two"):
+        table(tmp_path / f"{name}.obj")
+    words = ["infer", "one.obj", "two.obj", "--out", "res", "--no-picture"]
+    assert [run(*words).code for _ in range(2)] == [0, 0]
+    text, written = tmp_path / "res" / "one.shape", (tmp_path / "res" / "one.shape").read_text()
+    edited = written.replace("thickness=2", "thickness=3")
+    text.write_text(edited)
+    ended = run(*words)
+    assert (ended.code, text.read_text()) == (1, edited)
+    assert "one.obj: res/one.shape is not replaced: it differs from the text in one.json" in ended.err
+    assert "two.json" in ended.out
+    assert "--overwrite" in ended.err
+    (tmp_path / "res" / "one.json").unlink()
+    ended = run(*words)
+    assert (ended.code, text.read_text()) == (1, edited)
+    assert "it has no one.json beside it" in ended.err
+    assert run(*words, "--overwrite").code == 0
+    assert text.read_text() == written
+    assert len(list((tmp_path / "res").iterdir())) == 6
+    text.unlink()
+    assert run(*words).code == 0

@@ -50,6 +50,9 @@ def infer_command(
     ),
     budget: Annotated[float, about_search(metavar="SECONDS", help="Time limit per shape.", min=0.1)] = BUDGET,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.")] = FOLDER,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace .shape files that may have been edited.")
+    ] = False,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Do not write the PNG.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON per shape.")] = False,
 ) -> None:
@@ -58,7 +61,8 @@ def infer_command(
     Example: shapeprog infer chair.glb --unit cm --out results
 
     The program keeps the position of the input, so later exports lie on it. The same seed gives the same files.
-    An input that cannot be read is reported at the end; the others are processed.
+    An input that cannot be read is reported at the end; the others are processed. A second run replaces the results of
+    the first, unless a .shape file was edited.
     """
     from shapeprog.cli.results import document, free_stem, measured, write
     from shapeprog.data import load_all
@@ -82,8 +86,8 @@ def infer_command(
 
     def inferred(shape: Shape, progress: Callable[[str, float], None]) -> tuple[Result, list[str]]:
         """What was inferred from a shape, and the names of the files."""
+        stem = free_stem(shape, stems, folder, overwrite)
         result = measured(inference(shape, progress=progress), shape, seed)
-        stem = free_stem(shape, stems, folder)
         names = write(result, shape, folder, stem)
         if not no_picture:
             picture(shape, result.program, folder / f"{stem}.png", scores=result.scores)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -14,6 +15,7 @@ from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.files import write_text
 from shapeprog.formats import export
 from shapeprog.formats.json_form import program_to_json, read_result
+from shapeprog.formats.shape import read_text
 from shapeprog.inference.infer import Result
 from shapeprog.language.printer import format_program
 
@@ -48,30 +50,42 @@ def write(result: Result, shape: Shape, folder: Path, stem: str) -> list[str]:
     return [f"{stem}.json", *(path.name for path in written)]
 
 
-def free_stem(shape: Shape, stems: set[str], folder: Path) -> str:
+def free_stem(shape: Shape, stems: set[str], folder: Path, overwrite: bool = False) -> str:
     """A file name that neither another shape, of this run or an earlier one, nor another file has.
 
-    The same input may replace its own results.
+    The same input may replace its own results; a ``ShapeProgError`` if their text was edited, unless ``overwrite``.
     """
     base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._")[:_LONGEST] or "shape"
     stem, number = base, 1
-    while stem in stems or not _replaceable(shape, folder, stem):
+    while stem in stems or not _replaceable(shape, folder, stem, overwrite):
         number += 1
         stem = f"{base}_{number}"
     stems.add(stem)
     return stem
 
 
-def _replaceable(shape: Shape, folder: Path, stem: str) -> bool:
-    """Whether there are no files of that name, or only earlier results of the same shape."""
+def _replaceable(shape: Shape, folder: Path, stem: str, overwrite: bool) -> bool:
+    """Whether there are no files of that name, or only earlier results of the same shape; an error if they may have been
+    edited, unless ``overwrite``."""
     if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
         return False
     if not any((folder / f"{stem}{suffix}").exists() for suffix in _SUFFIXES):
         return True
-    try:
-        return read_result(folder / f"{stem}.json").source == _source(shape)
-    except ShapeProgError:
-        return False
+    text, result, written = folder / f"{stem}.shape", folder / f"{stem}.json", None
+    if result.exists():
+        try:
+            if read_result(result).source != _source(shape):
+                return False
+        except ShapeProgError:
+            return False
+        written = json.loads(read_text(result))["text"].splitlines()
+    if not text.exists():
+        return written is not None
+    if overwrite or read_text(text).splitlines() == written:
+        return True
+    cause = f"has no {result.name} beside it" if written is None else f"differs from the text in {result.name}"
+    cure = "it may have been edited: --overwrite replaces it, --out FOLDER writes to another folder"
+    raise ShapeProgError(f"{text} is not replaced: it {cause}", cure)
 
 
 def _source(shape: Shape) -> str | None:

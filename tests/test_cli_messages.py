@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from commands import Run, table
 
+from shapeprog.language.named import names as named
+from shapeprog.language.parser import parse
+
 
 def cloud(path: Path) -> np.ndarray:
     """Points on the table, in the axes of the mesh that is written to a file."""
@@ -113,3 +116,45 @@ def test_infer_replaces_its_own_results_but_no_edited_text_unless_it_may(run: Ru
     assert len(list((tmp_path / "res").iterdir())) == 6
     text.unlink()
     assert run(*words).code == 0
+
+
+TABLE = """\
+diameter = 42.6
+width, depth, height = diameter, diameter, 70
+inset = 4
+n = 4
+top(cylinder(top=0, height=2))
+for _ in rotate(n):
+    leg(cylinder(y=inset - 21, top=2, radius=2))
+"""
+
+
+@pytest.mark.parametrize("words", [["export", "o.stl"], ["render", "o.png"], ["show", "o.html"]])
+def test_changes_with_which_parts_come_apart_or_vanish_are_told_with_the_range(
+    run: Run, tmp_path: Path, words: list[str]
+):
+    (tmp_path / "t.shape").write_text(TABLE)
+
+    def told(*changes: str) -> str:
+        ended = run(words[0], "t.shape", words[1], "--set", *changes)
+        assert ended.code == 0
+        return ended.err
+
+    low, high = named(parse(TABLE))[0].range or (0, 0)
+    expected = f"diameter may be {low:.4g} to {high:.4g}"
+    assert "warning: t.shape, with diameter=28: parts come apart or vanish; " in told("diameter=28")
+    assert expected in told("diameter=28")
+    assert "inset may be" not in told("diameter=28")
+    assert not told("diameter=300")  # beyond what is tried for the range, but in one piece
+    assert not told("diameter=28", "inset=9")
+    assert not told("n=1")
+    assert "parts come apart or vanish" in told("n=1", "inset=-40")
+
+
+def test_computed_numbers_have_as_many_digits_as_are_meaningful(run: Run, tmp_path: Path):
+    (tmp_path / "t.shape").write_text(TABLE)
+    for change, digits in (("diameter*=1.1", "46.86"), ("diameter+=.3", "42.9"), ("diameter/=3", "14.2")):
+        assert run("export", "t.shape", "o.shape", "--overwrite", "--set", change, "inset=0.123456789").code == 0
+        text = (tmp_path / "o.shape").read_text()
+        assert f"diameter = {digits}\n" in text
+        assert "inset = 0.12345679\n" in text

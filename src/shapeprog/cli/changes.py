@@ -13,11 +13,13 @@ if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
 CHANGE = re.compile(r"([^\W\d]\w*)\s*([-+*/]?)=\s*(.*)", re.DOTALL)
+DIGITS = 7  # of numbers that are computed: those that float32 holds
 _APPLY = {"": lambda _, number: number, "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 
 
-def changed(program: Program, changes: Sequence[str]) -> Program:
-    """The program with other numbers for some of its names, one change after another.
+def changed(program: Program, changes: Sequence[str]) -> tuple[Program, list[str]]:
+    """The program with other numbers for some of its names, one change after another, and a warning where parts come
+    apart.
 
     Raises
     ------
@@ -27,11 +29,12 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
         If the program has no such name, or cannot be drawn so.
     """
     if not changes:
-        return program
-    from shapeprog.language.named import names
+        return program, []
+    from shapeprog.language.named import loosened, names
     from shapeprog.language.named import set as set_numbers
+    from shapeprog.language.parameters import shortest
 
-    values = {named.name: named.value for named in names(program)}
+    values = {named.name: float(shortest(named.value)) for named in names(program)}
     wanted: dict[str, float] = {}
     for change in changes:
         match = CHANGE.fullmatch(change.strip())
@@ -40,9 +43,16 @@ def changed(program: Program, changes: Sequence[str]) -> Program:
         name, sign, text = match.groups()
         try:
             number = float(text)
-            wanted[name] = _APPLY[sign](wanted.get(name, values.get(name, number)), number)
+            result = _APPLY[sign](wanted.get(name, values.get(name, number)), number)
+            wanted[name] = float(f"{result:.{DIGITS}g}") if sign else result
         except ValueError:
             raise InputError(f"{change!r}: {text!r} is not a number", "write a number such as 11 or 1.2") from None
         except ZeroDivisionError:
             raise InputError(f"{change!r} divides by zero", "divide by another number") from None
-    return set_numbers(program, wanted)
+    edited = set_numbers(program, wanted)
+    if (ranges := loosened(program, edited, wanted)) is None:
+        return edited, []
+    known = [f"{name} may be {low + 0.0:.4g} to {high + 0.0:.4g}" for name, (low, high) in ranges.items()]
+    while_others = f"; while the other numbers are as they are, {', '.join(known)}" if known else ""
+    numbers = ", ".join(f"{name}={number:g}" for name, number in wanted.items())
+    return edited, [f"with {numbers}: parts come apart or vanish{while_others}"]

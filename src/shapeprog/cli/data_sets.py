@@ -175,7 +175,7 @@ def evaluate_command(
     for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=hidden):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
         if isinstance(prediction, tuple):
-            terminal.warn(path, prediction[0])
+            terminal.warn(path, *(prediction[0].source.warnings if prediction[0].source else ()))
             if target is not None:
                 prediction = scoring.aligned(prediction, target)
         try:

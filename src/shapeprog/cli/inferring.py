@@ -169,5 +169,5 @@ def _report(
         units.add(unit)
         console.print(terminal.assumed(shape.frame, unit), style="dim")
     lines = [*scores_text(result.scores | {"seconds": result.seconds}, result.program), result.reason]
-    for line in (*lines, f"Wrote {', '.join(names)} in {folder}.", ""):
+    for line in (*lines, f"Wrote {', '.join(names)} in {folder}", ""):
         console.print(line, style="dim")

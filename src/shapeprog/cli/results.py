@@ -65,7 +65,7 @@ def free_stem(shape: Shape, stems: set[str], folder: Path, overwrite: bool = Fal
 
 
 def _replaceable(shape: Shape, folder: Path, stem: str, overwrite: bool) -> bool:
-    """Whether there are no files of that name, or only earlier results of the same shape; an error if they may have been
+    """Whether there are no files of that name, or only earlier results of the same shape; an error if these may be
     edited, unless ``overwrite``."""
     if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
         return False

@@ -281,13 +281,15 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple
     from shapeprog.formats import load_with_frame
 
     program, frame = load_with_frame(path)
-    warn(path, program)
-    return changed(program, changes or ()), frame
+    warn(path, *(program.source.warnings if program.source else ()))
+    edited, doubts = changed(program, changes or ())
+    warn(path, *doubts)
+    return edited, frame
 
 
-def warn(path: Path, program: Program) -> None:
-    """Print what is legal in the program of a file and probably a mistake."""
-    for warning in program.source.warnings if program.source else ():
+def warn(path: Path, *warnings: str) -> None:
+    """Print what is legal in a program and probably a mistake."""
+    for warning in warnings:
         errors().print(f"warning: {path}, {warning}", style="yellow")
 
 

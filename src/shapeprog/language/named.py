@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -116,6 +116,20 @@ def _set(line: Line, replacements: Mapping[str, float]) -> Line:
     return replace(line, numbers=tuple(pairs))
 
 
+def loosened(program: Program, edited: Program, changed: Collection[str]) -> dict[str, tuple[float, float]] | None:
+    """The ranges of changed names, as far as they are free, if parts of the edited program come apart or vanish.
+
+    ``None`` if it holds together as the program did, or has too many parts to tell.
+    """
+    numbers = [named for named in names(program) if named.name in changed]
+    with on_numpy_if_shipped(program):
+        check = _Check(program)
+        whole = any(number.whole for number in numbers)
+        if edited.size > check.most or all(check.fits([edited], [whole])):
+            return None
+    return _ranges(program, [number for number in numbers if number.free])
+
+
 # ---- ranges ---------------------------------------------------------------------------------------------------------
 
 
@@ -183,10 +197,16 @@ class _Check:
             if edited.size <= self.most:
                 programs[index] = edited
         results = [False] * len(changes)
-        if programs:
-            scenes = unroll(list(programs.values()))
-            groups = [None] * len(programs) if self.groups is None else contact_groups(scenes)
-            for index, parts, count in zip(programs, scenes.mask.sum(-1).tolist(), groups, strict=True):
-                complete = parts >= self.parts or changes[index][0].whole
-                results[index] = complete and (count is None or self.groups is None or count <= self.groups)
+        fits = self.fits([*programs.values()], [changes[index][0].whole for index in programs]) if programs else ()
+        for index, good in zip(programs, fits, strict=True):
+            results[index] = good
         return results
+
+    def fits(self, programs: Sequence[Program], fewer: Sequence[bool]) -> list[bool]:
+        """Whether these programs hold together and have as many parts, or ``fewer`` where that may be."""
+        scenes = unroll(list(programs))
+        groups = [None] * len(programs) if self.groups is None else contact_groups(scenes)
+        return [
+            (parts >= self.parts or less) and (count is None or self.groups is None or count <= self.groups)
+            for parts, less, count in zip(scenes.mask.sum(-1).tolist(), fewer, groups, strict=True)
+        ]

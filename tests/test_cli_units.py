@@ -102,17 +102,26 @@ def test_meshes_are_exported_in_the_unit_that_is_asked_for(run: Run, tmp_path: P
 def test_export_writes_programs_in_another_unit(run: Run, tmp_path: Path) -> None:
     export(parse(NAMED), tmp_path / "legs.shape", FRAME)
     assert run("export", "legs.shape", "cm.shape", "--unit", "cm").code == 0
-    there, frame = load_with_frame(tmp_path / "cm.shape")
-    assert source_of(there).lines == source_of(in_readable_unit(parse(NAMED), Unit("cm", 100 / 12))).lines
-    assert "width, depth, height = 66.7, 66.7, 200\nn = 2\n" in (tmp_path / "cm.shape").read_text()
+    _, frame = load_with_frame(tmp_path / "cm.shape")
+    assert "width, depth, height = 66.667, 66.667, 200\nn = 2\n" in (tmp_path / "cm.shape").read_text()
     assert run("export", "cm.shape", "mm.json", "--unit", "mm", "--set", "width=80").code == 0
     other, kept = load_with_frame(tmp_path / "mm.json")
     assert frame is not None
     assert kept is not None
     np.testing.assert_allclose(kept.matrix(), frame.matrix(), rtol=1e-7)
-    assert [each.value for each in names(other)] == [800, 667, 2000, 2, 633]
+    assert [each.value for each in names(other)] == [800, pytest.approx(666.67), 2000, 2, pytest.approx(633.33)]
     assert run("export", "mm.json", "back.shape", "--unit", "cells").code == 0
-    assert (tmp_path / "back.shape").read_text().splitlines()[1] == "width, depth, height = 9.6, 8, 24"
+    assert (tmp_path / "back.shape").read_text().splitlines()[1] == "width, depth, height = 9.6, 8.00004, 24"
+
+
+def test_conversions_keep_dimensions_to_a_hundredth_of_a_millimetre(run: Run, tmp_path: Path) -> None:
+    sizes = "width, depth, height = 60, 46, 72.5\nthickness = 1.8\ngap = 0.0012\ntop(top=gap, height=thickness)\n"
+    (tmp_path / "desk.shape").write_text(f"# unit: cm\n{sizes}")
+    for unit in ("in", "mm", "m"):
+        assert run("export", "desk.shape", f"{unit}.shape", "--unit", unit).code == 0
+    assert "= 23.622, 18.11, 28.543\nthickness = 0.709\ngap = 0.000472\n" in (tmp_path / "in.shape").read_text()
+    assert "= 600, 460, 725\nthickness = 18\n" in (tmp_path / "mm.shape").read_text()
+    assert "= 0.6, 0.46, 0.725\nthickness = 0.018\n" in (tmp_path / "m.shape").read_text()
 
 
 def test_without_a_frame_files_count_in_the_unit_of_the_program(run: Run, tmp_path: Path) -> None:

@@ -79,9 +79,10 @@ def export_command(
         try:
             written = loaded
             if unit is not None and path.suffix.lower() in suffixes("program"):
-                from shapeprog.inference.readable import in_readable_unit
+                from shapeprog.language.dimensions import in_unit
 
-                written = in_readable_unit(loaded, terminal.asked_unit(loaded.unit, frame, program, unit, file_unit))
+                asked_unit = terminal.asked_unit(loaded.unit, frame, program, unit, file_unit)
+                written = in_unit(loaded, asked_unit, workshop=True)
             export(written, path, frame, **asked)
         except ShapeProgError as error:  # the other files do not depend on this one
             failures.append(error)

@@ -6,6 +6,7 @@ in products, powers of length add up.  Lengths are rescaled when a program is wr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
@@ -34,9 +35,11 @@ from shapeprog.language.placement import BOX, SIZES
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
-from shapeprog.language.unit import Unit
+from shapeprog.language.unit import METRES, Unit
 
 DIGITS = 6  # digits of a length that is converted: float32 has two more, which would show that it was
+FINEST = 1e-5  # metres to which lengths are rounded that a person has written, and the least digits that they keep
+LEAST_DIGITS = 3
 
 _NOTHING = 1e-9
 _PLAIN = ("tilt", "turn", "step")
@@ -111,10 +114,10 @@ def _scoped_uses(lines: Iterable[Line], scope: Scope) -> Iterator[tuple[Use, Sco
         yield from _scoped_uses(body_of(line), _inside(line, scope))
 
 
-def in_unit(program: Program, unit: Unit | None) -> Program:
+def in_unit(program: Program, unit: Unit | None, workshop: bool = False) -> Program:
     """The same placed program with its lengths in a unit, or in cells; unchanged if it is in this unit.
 
-    Lengths keep six digits.
+    Lengths keep six digits; for a ``workshop`` they are rounded to .01 mm or .001 in.
 
     Raises
     ------
@@ -131,7 +134,11 @@ def in_unit(program: Program, unit: Unit | None) -> Program:
     def change(number: float, power: float) -> float:
         if not power or not number:
             return number
-        return to_float32(float(f"{number * factor**power:.{DIGITS}g}"))
+        result = number * factor**power
+        if workshop and power == 1 and unit.name:
+            least = LEAST_DIGITS - 1 - math.floor(math.log10(abs(result)))
+            return to_float32(round(result, max(least, math.floor(-math.log10(FINEST / METRES[unit.name])))))
+        return to_float32(float(f"{result:.{DIGITS}g}"))
 
     return _scaled(Source(_Powers(source).changed(source.lines, change), unit), source)
 

@@ -158,3 +158,21 @@ def test_computed_numbers_have_as_many_digits_as_are_meaningful(run: Run, tmp_pa
         text = (tmp_path / "o.shape").read_text()
         assert f"diameter = {digits}\n" in text
         assert "inset = 0.12345679\n" in text
+
+
+def test_no_file_is_written_if_one_of_them_has_no_format(run: Run, tmp_path: Path):
+    (tmp_path / "t.shape").write_text(TABLE)
+    for word in ("inset=3", "inset=4.5", "diameter*=1.1"):
+        ended = run("export", "t.shape", "o.stl", word)
+        assert (ended.code, list(tmp_path.glob("o.*"))) == (2, [])
+        assert f"--set {word}" in ended.err
+    ended = run("export", "t.shape", "o.stl", "o.gbl")
+    assert (ended.code, list(tmp_path.glob("o.*"))) == (2, [])
+    assert "did you mean .glb" in ended.err
+
+
+@pytest.mark.parametrize("words", [["render", "o.png"], ["show", "o.html"]])
+def test_a_program_that_draws_nothing_is_told(run: Run, tmp_path: Path, words: list[str]):
+    (tmp_path / "t.shape").write_text("width, depth, height = 8, 8, 24\n")
+    ended = run(words[0], "t.shape", words[1])
+    assert "warning: t.shape, nothing is drawn" in ended.err

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shapeprog.cli import terminal
+from shapeprog.cli.changes import CHANGE
 from shapeprog.cli.terminal import about_input
 from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
@@ -59,17 +60,22 @@ def export_command(
     """
     from shapeprog.formats import export
     from shapeprog.formats.cuts import cut_table
+    from shapeprog.formats.files import written_format
     from shapeprog.language.unit import MOST_METRES
     from shapeprog.space import SPAN
 
     terminal.check_units(unit, file_unit)
     terminal.load_modules(modules)
     for path in outputs:
+        if "=" in path.name and CHANGE.fullmatch(str(path)) and format_of(path) is None:
+            raise OutputError(f"{path} is no file to write", f"changes of numbers follow --set: --set {path}")
+    formats = [written_format(path) for path in outputs]
+    for path in outputs:
         if path.suffix == program.suffix and path.is_file() and not overwrite and not path.samefile(program):
             cure = "give one program, then the files to write; --overwrite replaces existing programs"
             raise OutputError(f"{path} exists and is another program than {program}", cure)
     loaded, frame = terminal.read_program_file(program, changes)
-    makers = any(chosen.maker for path in outputs if (chosen := format_of(path)) is not None)
+    makers = any(chosen.maker for chosen in formats)
     known = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
     if frame is not None and makers and not known and SPAN * frame.scale > MOST_METRES:
         terminal.note(terminal.assumed(frame))
@@ -144,6 +150,8 @@ def _draw(
 
     terminal.load_modules(modules)
     loaded, frame = terminal.read_program_file(program, changes)
+    if not loaded.size:
+        terminal.warn(program, "nothing is drawn: write a part below the size, such as box(height=2)")
     shape, scores = _input_and_scores(program, named, changes)
     if output.suffix.lower() in PAGES:
         viewer(loaded, output, shape=shape, title=program.stem, scores=scores, frame=frame)

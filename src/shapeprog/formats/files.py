@@ -8,7 +8,7 @@ from pathlib import Path
 
 from shapeprog.errors import InputError, OutputError, did_you_mean
 from shapeprog.files import write_bytes
-from shapeprog.formats.format import format_of, listed, program_suffixes, suffixes
+from shapeprog.formats.format import Format, format_of, listed, program_suffixes, suffixes
 from shapeprog.formats.frames import placement
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
@@ -92,6 +92,15 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     export(program, path, frame)
 
 
+def written_format(path: Path) -> Format:
+    """The format of a file to write; an ``OutputError`` if none ends so."""
+    file_format, suffix = format_of(path), path.suffix.lower()
+    if file_format is None or not file_format.writer:
+        wrong = f"no export ends in {suffix!r}" if suffix else f"{path} has no suffix, so its format is unknown"
+        raise OutputError(wrong, did_you_mean(suffix, suffixes()))
+    return file_format
+
+
 def export(
     program: Program,
     path: str | os.PathLike[str],
@@ -131,10 +140,7 @@ def export(
         If the suffix is unknown, the program draws nothing that the format can hold, or the file cannot be written.
     """
     target = Path(path)
-    file_format, suffix = format_of(target), target.suffix.lower()
-    if file_format is None or not file_format.writer:
-        wrong = f"no export ends in {suffix!r}" if suffix else f"{target} has no suffix, so its format is unknown"
-        raise OutputError(wrong, did_you_mean(suffix, suffixes()))
+    file_format, suffix = written_format(target), target.suffix.lower()
     lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
     known: dict[str, int | str] = {"unit": lies.unit, "stem": target.stem}
     takes = file_format.options

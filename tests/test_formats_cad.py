@@ -299,8 +299,16 @@ def test_a_cut_list_has_each_distinct_part_once(tmp_path: Path, capsys: pytest.C
     program_file.write_text(CABINET.lstrip())
     with pytest.raises(SystemExit, match="0"):
         main(["export", str(program_file), str(tmp_path / "cuts.csv"), "--unit", "mm"])
-    assert "1 copies lie where others lie" in capsys.readouterr().out
+    assert "1 copy lies where another one lies" in capsys.readouterr().out
     lines = (tmp_path / "cuts.csv").read_text().splitlines()
     assert lines[0] == "count,role,length (mm),width (mm),thickness (mm),diameter (mm),shape"
     assert "2,side,600,400,18,,board" in lines
     assert "4,foot,100,,,40,round" in lines
+
+
+def test_areas_of_inches_are_in_square_feet_and_a_section_has_one_word(tmp_path: Path):
+    lines = "".join(f"leg(height={length}, width=3.35, depth=3.35)\n" for length in (10.05, 10.06, 30))
+    program = parse(f"# unit: in\nwidth, depth, height = 24, 24, 40\ntop(top=0, height=1)\n{lines}")
+    found = cut_list(program, upright(program, "a.csv"), "in")
+    assert found.area == "4 ft²"
+    assert [cut.shape for cut, _ in found.cuts] == ["", "", "", "board"]

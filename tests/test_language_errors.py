@@ -265,3 +265,28 @@ def test_a_list_of_programs_has_no_text() -> None:
     with pytest.raises(ShapeProgError, match="takes one program, not a list") as caught:
         format_program(programs)  # type: ignore[arg-type]
     assert "format each" in caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("leg(left=3 1/2, width=2)", "write 3.5 for 3 1/2"),
+        ("leg(width=2, left=1, height=10 3 / 16)", "write 10.1875 for 10 3 / 16"),
+        ("thickness = 0 3/4", "write 0.75 for 0 3/4"),
+    ],
+)
+def test_mixed_fractions_are_told_as_decimals(line: str, hint: str) -> None:
+    with pytest.raises(ProgramError) as error:
+        parse(f"width, depth, height = 8, 8, 24\n{line}\n")
+    assert (error.value.line, error.value.hint) == (2, hint)
+
+
+@pytest.mark.parametrize("comment", ["# unit: cm", "# Units = cm"])
+@pytest.mark.parametrize("line", ["width, depth, height = 8, 8, 24", "leg(width=2)", ""])
+def test_a_unit_that_is_not_at_the_top_has_a_warning(line: str, comment: str) -> None:
+    head = "width, depth, height = 8, 8, 24\nleg(width=2)\n"
+    text = head.replace(line, f"{line}  {comment}") if line else f"{head}{comment}\n"
+    (warning,) = parse(text).source.warnings
+    assert "this comment sets no unit; write # unit: cm above all other lines" in warning
+    assert not parse(f"# unit: cm\n{text}").source.warnings
+    assert not parse(f"{head}rail(width=1)  # unit: length of a unit\n").source.warnings

@@ -22,6 +22,7 @@ from shapeprog.language.unroll import exact_scene
 from shapeprog.space import FloatArray, Frame
 
 FINEST = 1e-4  # metres to which sizes are rounded
+FOOT = 0.3048  # metres
 DIGITS = 3  # significant digits of areas; sizes whose unit is not known have one more
 BOARD = "board"  # the shape of a box whose thickness is at most half its width
 SAME = 1e-3  # cells within which two copies coincide
@@ -36,7 +37,7 @@ class Cut(NamedTuple):
     role
         Its role or statement.
     shape
-        ``board``, ``bar`` or ``block``, ``round``, or the dimensions needed to make it, such as ``rounded edges 3``.
+        ``board``, ``round``, the dimensions needed to make it, such as ``rounded edges 3``, or empty for other boxes.
     length
         Its longest side, or the length of a round part.
     width, thickness
@@ -67,7 +68,8 @@ class CutList(NamedTuple):
     def area(self) -> str:
         """Total length x width of all boards."""
         total = sum(count * cut.length * cut.width for cut, count in self.cuts if cut.shape == BOARD)
-        total, unit = (total * METRES[self.unit] ** 2, "m²") if self.unit else (total, "square units")
+        size, unit = (FOOT, "ft²") if self.unit == "in" else (1.0, "m²" if self.unit else "square units")
+        total *= (METRES.get(self.unit, 1.0) / size) ** 2
         return f"{float(f'{total:.{DIGITS}g}'):g} {unit}"
 
     @property
@@ -87,7 +89,8 @@ class CutList(NamedTuple):
         lines = ["  ".join(f"{text:<{n}}" for text, n in zip(row, widths, strict=True)).rstrip() for row in self.rows]
         lines.append(f"Area of boards, length x width: {self.area}")
         if self.coinciding:
-            lines.append(f"Warning: {self.coinciding} copies lie where others lie (a mirror through the part?).")
+            copies = f"{self.coinciding} copies lie" if self.coinciding > 1 else "1 copy lies"
+            lines.append(f"Warning: {copies} where another one lies (a mirror through the part?).")
         return "\n".join(lines)
 
 
@@ -155,8 +158,7 @@ def _cut(role: str, name: str, size: FloatArray, half: FloatArray, rounded: Call
         edge = rounded(min(size[3], *size[:3]))
         shape = f"rounded edges {edge:g}" if edge > 0 else ""
     thickness, width, length = (rounded(2 * side) for side in sorted(half))
-    box = BOARD if 2 * thickness <= width else "bar" if length > 3 * width else "block"
-    return Cut(role, shape or box, length, width, thickness)
+    return Cut(role, shape or (BOARD if 2 * thickness <= width else ""), length, width, thickness)
 
 
 def _rounded(cells: float, scale: float, unit: str) -> float:

@@ -37,7 +37,7 @@ from shapeprog.language.unit import METRES
 _IN_CELLS = {"at", "size", "by", "section"}
 _ONLY_PLACED = {"at", "inside", "divide", "row"}
 _SIDES = {word for words in AXES for word in (words.low, words.high)}
-_LIKE_UNIT = re.compile(r"[ \t]*#[ \t]*units?[ \t]*[:=][ \t]*\w+[ \t]*$", re.IGNORECASE)
+_LIKE_UNIT = re.compile(r"[^#]*#[ \t]*units?[ \t]*[:=][ \t]*\w+[ \t]*$", re.IGNORECASE)
 _UNIT = re.compile(r"#[ \t]*unit:[ \t]*(\S+)[ \t]*")
 
 

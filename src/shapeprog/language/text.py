@@ -69,6 +69,9 @@ class Text:
             column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
             message = (error.msg or "").split(";")[0].removeprefix("invalid syntax").strip(". ") or "unexpected word"
             hint = next((hint for words, hint in _SYNTAX_HINTS.items() if words in message), _SYNTAX_HINT)
+            if mixed := re.search(r"(\d+)[ \t]+(\d+)[ \t]*/[ \t]*0*([1-9]\d*)", self.lines[row - 1]):
+                whole, part, parts = (float(digits) for digits in mixed.groups())
+                hint = f"write {whole + part / parts:.6g} for {mixed[0]}"
             for word, ours in _WORDS_OF_PYTHON.items():
                 message = message.replace(word, ours)
             raise self.at(row, column, f"invalid syntax: {message}", hint) from None

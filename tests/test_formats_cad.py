@@ -312,3 +312,25 @@ def test_areas_of_inches_are_in_square_feet_and_a_section_has_one_word(tmp_path:
     found = cut_list(program, upright(program, "a.csv"), "in")
     assert found.area == "4 ft²"
     assert [cut.shape for cut, _ in found.cuts] == ["", "", "", "board"]
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".3mf"])
+def test_files_for_printers_rest_on_their_lowest_point(suffix: str, tmp_path: Path):
+    text = "# unit: cm\nwidth, depth, height = 50, 40, 45\nseat(top=0, height=3)\n"
+    slanted = "leg(bar(start=at(left=2, y=0), end=at(left=8, y=0, top=3), width=4, depth=4))\n"
+    program = parse(f"{text}{slanted}")
+    low, high = bounds_of(export(program, tmp_path / f"a{suffix}"))
+    assert low[2] == pytest.approx(0, abs=0.01)
+    assert high[2] > 450 + 1, "lifted by what dips below the floor"
+    assert [low[1], high[1]] == pytest.approx([-200, 200], abs=0.01)
+    low, _ = bounds_of(export(program, tmp_path / f"b{suffix}", unit="cm", up="y"))
+    assert low[1] == pytest.approx(0, abs=0.001)
+    frame = Frame(1.0, (0.0, 0.0, 0.0), tuple(map(tuple, grid_axes("+z", "-y"))))
+    low, _ = bounds_of(export(program, tmp_path / f"c{suffix}", frame, on_input=True))
+    assert low[2] < -10.8 - 0.1, "on the input it stays where it is"
+    assert "scale(10) whole(" in scad_text(program, upright(program))
+
+
+def test_what_step_files_need_is_the_same_in_messages_and_documentation():
+    for text in (format_of("a.step").doc, (Path(__file__).parents[1] / "docs" / "formats.md").read_text()):
+        assert "pip install build123d" in text

@@ -74,6 +74,12 @@ class Format:
         return self.unit == "mm"
 
     @property
+    def rests(self) -> bool:
+        """Whether the lowest point of the shape is on z = 0; scripts stand on the floor of the program, since changes
+        of their numbers move that point."""
+        return self.maker and self.writer.startswith("meshes:")
+
+    @property
     def options(self) -> set[str]:
         """Further arguments of the writer."""
         return {*inspect.signature(_function(self.writer)).parameters} - {"program", "frame"}

@@ -113,7 +113,7 @@ def placement(
         centre = per_cell / frame.scale * np.array(frame.centre)
         return Placement(Frame.of(per_cell, centre, np.array(frame.axes)), name)
     matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
-    centre = -per_cell * (matrix @ _ground(program)) + 0.0 if chosen.maker else np.zeros(3)
+    centre = -per_cell * (matrix @ _ground(program, chosen.rests)) + 0.0 if chosen.maker else np.zeros(3)
     return Placement(Frame.of(per_cell, centre, matrix), name)
 
 
@@ -140,19 +140,22 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
     return per_cell, ""
 
 
-def _ground(program: Program) -> FloatArray:
-    """The point of the grid where a program stands: the middle of the bottom of the whole, or of what is drawn."""
+def _ground(program: Program, rests: bool) -> FloatArray:
+    """The point of the grid where a program stands: the middle of the bottom of the whole, or of what is drawn.
+
+    The end of a slanted bar dips below its end point: ``rests`` if the lowest point is asked for.
+    """
     from shapeprog.formats.parts import parts  # reading a program needs no geometry
     from shapeprog.language.convert import placed_if_possible
 
-    if (scale := placed_if_possible(program).scale) is not None:
-        return np.array([scale.floor, scale.middle, 0.0])
-    vertices = [part.vertices for part in parts(program)]
+    scale = placed_if_possible(program).scale
+    floor = np.zeros(3) if scale is None else np.array([scale.floor, scale.middle, 0.0])
+    vertices = [part.vertices for part in parts(program)] if rests or scale is None else []
     if not vertices:
-        return np.zeros(3)
+        return floor
     every = np.concatenate(vertices)
     low, high = every.min(0), every.max(0)
-    return np.array([low[0], *(low[1:] + high[1:]) / 2])
+    return np.array([low[0], *((low[1:] + high[1:]) / 2 if scale is None else floor[1:])])
 
 
 def frame_of_text(frame: Frame, scale: Scale) -> Frame:

@@ -3,6 +3,7 @@
 A candidate is a program of one block.  All data for the selection is computed once as bits:
 
 *   points of the evidence that its surface explains (near enough, with a fitting normal);
+*   some of these points that are near even by half of the tolerance;
 *   points deep inside it, where it hides every other candidate;
 *   points of free space that it fills;
 *   parts of a mesh that one of its primitives draws;
@@ -56,6 +57,9 @@ class Prices:
     part
         Added for every part of a mesh that one primitive draws, 16 times at most: the gaps between drawers have
         little surface.
+    close
+        Added for the share of the target that lies within half a tolerance, with nearly the same normal: among
+        statements that explain the same, the one with the shape of the target wins, a square leg before a round one.
     """
 
     unsupported: float = 0.4
@@ -64,6 +68,7 @@ class Prices:
     loop: float = 0.002
     number: float = 0.0005
     part: float = 0.002
+    close: float = 0.02
 
     def of(self, program: Program) -> float:
         """The price of the text of a program; function definitions cost nothing."""
@@ -78,12 +83,12 @@ class Prices:
 class CoverageTable(NamedTuple):
     """Coverage of candidates, as rows of bits; each candidate has one word at the end.
 
-    ``rows`` (C, E + F + K + C) are the points that each candidate explains, the free points that it fills, the parts
-    that it draws, and the samples of every candidate that it hides.
+    ``rows`` (C, E + N + F + K + C) are the points that each candidate explains, those near its surface, the free points
+    that it fills, the parts that it draws, and the samples of every candidate that it hides.
     """
 
     rows: Bits
-    weights: FloatArray  # value of a bit of each of the first E + F + K words, negative for free points
+    weights: FloatArray  # value of a bit of each of the first E + N + F + K words, negative for free points
     evidence: int  # E, the number of words for points to be explained
     interior: Bits  # points deeper inside each candidate than the tolerance (C, E): no other candidate explains them
     exposed: Bits  # unsupported samples of the surface of each candidate that it does not hide itself (C,)
@@ -104,11 +109,14 @@ class Coverage:
         self.evidence, self.prices = evidence, prices or Prices()
         order = np.lexsort((nearby(evidence.points), -evidence.weights))  # points of a word weigh nearly the same
         self._points = sorted_by_cell(evidence.points[order], evidence.normals[order])
+        few = order[:: SETTINGS.every]
+        self._few = sorted_by_cell(evidence.points[few], evidence.normals[few])
+        near = self.prices.close * evidence.weights[few] / evidence.weights[few].sum()
         points, volume = free_points(evidence)
         self._free = sorted_by_cell(points)
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
         parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
-        self._weights = np.concatenate([by_word(evidence.weights[order]), by_word(free), by_word(parts)])
+        self._weights = np.concatenate(list(map(by_word, (evidence.weights[order], near, free, parts))))
         self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals)
         self._index: dict[Program, int] = {}
         self._rows: list[Array] = []
@@ -137,8 +145,10 @@ class Coverage:
         evidence, prices = self.evidence, self.prices
         price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
         explained, interior = covers(scene, self._points, evidence.tolerance, evidence.agreement)
+        agreement = max(evidence.agreement, SETTINGS.agreement)
+        near, _ = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
         _, free = covers(scene, self._free, evidence.tolerance)
-        covered = np.concatenate([explained & ~interior, free, pack(parts_drawn(scene, evidence))], 1)
+        covered = np.concatenate([explained & ~interior, near, free, pack(parts_drawn(scene, evidence))], 1)
         points, owners, areas = unsupported(scene, evidence, self._surface)
         number = np.bincount(owners, minlength=len(candidates))[:, None]
         sampled, slot = np.minimum(number, WORD), np.arange(WORD)

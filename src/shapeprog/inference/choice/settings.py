@@ -26,6 +26,9 @@ class Settings:
     least_samples: int = 64  # smallest and largest number for a candidate without loops, else one per cell
     most_samples: int = 256
     skin: float = 0.5  # height of samples above the surface, in tolerances, where others may hide them
+    every: int = 4  # one of so many points is tested for a surface near it:
+    near: float = 0.5  # within this share of the tolerance,
+    agreement: float = 0.8  # with at least this cosine between the normals
     free_points: int = 2048  # points drawn in free space
     parts: int = 16  # parts of a mesh from which the value of all is constant: a lattice is not drawn at any price
     centred: float = 0.1  # distance within which a candidate is in the middle

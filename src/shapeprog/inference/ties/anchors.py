@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import cycle, islice, product
 
 import numpy as np
 from jaxtyping import Float
@@ -75,12 +74,8 @@ class _AxisAnchors:
         beyond = np.stack([high <= near, low >= self.extent - near])
         if axis == 2:
             beyond = np.stack([reaches[0], high >= high.max() - TIES.below * self.extent])
-        self.weights = np.where(reaches, TIES.reaching, TIES.side) * (reaches | beyond)  # of faces that do not move
+        self.weights = TIES.side * (reaches | beyond)  # of faces that do not move
         self.overlap = self._overlaps(low, high)
-        moves = self.slopes.any(0).reshape(count, 2, -1).any(1).astype(int)  # (K, N)
-        shared = moves @ moves.T + moves[:, pairs[0]] @ moves[:, pairs[1]].T
-        # Elements of parts that touch are often better changed together.
-        self.together = np.argwhere(np.triu(shared + shared.T, 1) > 0).tolist()
 
     def _choices(self, element: Element) -> Sequence[Anchors]:
         centred = abs(element.middle - self.extent / 2) < TIES.off_middle * self.extent and self.axis < 2
@@ -131,18 +126,17 @@ class _AxisAnchors:
         return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
 
     def _descent(self, state: Array) -> tuple[float, Array]:
-        """The cost and state (K,) from which no change of an element, or of two that touch, is cheaper."""
-        total, groups = float(self._costs(state[None])[0]), [*([k] for k in range(len(state))), *self.together]
-        unchanged = 0
-        for group in islice(cycle(groups), 8 * len(groups)):
-            options = np.array([*product(*(range(len(self.choices[k])) for k in group))])
-            trials = np.repeat(state[None], len(options), 0)
-            trials[:, group] = options
-            costs = self._costs(trials)
-            unchanged += 1
-            if costs.min() < total - 1e-9:
-                state, total, unchanged = trials[costs.argmin()], float(costs.min()), 1
-            if unchanged == len(groups):
+        """The cost and state (K,) from which no change of an element is cheaper."""
+        total = float(self._costs(state[None])[0])
+        for _ in range(8):
+            before = state
+            for k, choices in enumerate(self.choices):
+                trials = np.repeat(state[None], len(choices), 0)
+                trials[:, k] = np.arange(len(choices))
+                costs = self._costs(trials)
+                if costs.min() < total - 1e-9:
+                    state, total = trials[costs.argmin()], float(costs.min())
+            if state is before:
                 break
         return total, state
 

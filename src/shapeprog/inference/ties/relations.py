@@ -257,7 +257,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
         if "last" in keys and touches and (face.single or other.single):
             yield Relation(row, TIES.contact)
         elif single:
-            yield Relation(row, TIES.straight if lines[0] == lines[1] else TIES.equal)
+            yield Relation(row, TIES.equal)
     else:
         meet = face.facing * other.facing == -1
         if touches and (meet or all(points) or bool(face.facing) != bool(other.facing)):

@@ -29,10 +29,9 @@ class TieSettings:
     floor: float = 6.0  # a part that ends just above the floor
     centred: float = 4.0  # equal clearances on the left and right
     contact: float = 2.0  # faces that meet; equal clearances in front and at the rear
-    # Ends of a rod at equal distances, or on the middle line of a part that it touches; a row along one axis
-    straight: float = 1.5
-    # Zeros; equal sections, equal sizes of parts of one role, and equal clearances, of a part at a corner or of parts
-    # at one side or at opposite sides
+    straight: float = 1.5  # ends of a rod at equal distances, or on the middle line of a part that it touches
+    # Zeros; equal sections, equal sizes of parts of one role, and equal clearances, of a part at a corner, of parts
+    # at one side or at opposite sides, or of a row along one axis
     equal: float = 1.0
 
     # By how much a relation may be off
@@ -48,7 +47,6 @@ class TieSettings:
     separated: float = 5.0  # of a pair of parts that touch and would be separated
     touch: float = 0.12  # gap up to which they touch
     side: float = 2.0  # of a copy of a part near a side of the whole that does not move with it
-    reaching: float = 8.0  # of one that reaches the side
     resized: float = 2.0  # of a short part that changes its size, times how much it is below ``spanning``
     rigid: float = 5.0  # of a copy of a long part that keeps its size
     middle: float = 2.0  # of an end measured from the middle, where the middle of the part is not that of the whole

@@ -3,7 +3,7 @@ box."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import TypeGuard
@@ -16,50 +16,35 @@ from shapeprog.language.convert.forms import cost
 from shapeprog.language.evaluate import placed_source, symbolic
 from shapeprog.language.expression import Expression
 from shapeprog.language.merging import merged_lines
-from shapeprog.language.placement import AXES, BOX, ROUND, axis_of
+from shapeprog.language.placement import AXES, BOX, axis_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
 
-def simplified(line: Line) -> Line:
-    """The line without redundant keywords."""
-    arguments = dict(line.keywords) if isinstance(line, Part | Group) else {}
-    if isinstance(line, Group) and "last" in arguments:
-        first = next(inner for inner in Source(line.body).walk() if _has_box(inner))
-        return replace(line, keywords=(("last", _without(arguments["last"], _start(first))),))
-    if not _has_box(line):
-        return line
-    defaults = {"tilt", "lean", "turn", "gap"}  # what can be left out where it is zero
-    for axis, words in enumerate(AXES):
-        sized = words.size in arguments or (axis < 2 and line.kind in ROUND and "radius" in arguments)
-        defaults |= {words.low if axis == 2 else words.offset} if sized else {words.low, words.high, words.offset}
-    keywords: list[tuple[str, Argument]] = []
-    for word, argument in line.keywords:
-        if isinstance(argument, Point):
-            argument = _without(argument, {"x": 0.0, "y": 0.0, "bottom": 0.0} if word == "start" else _start(line))
-        if argument != 0 or word not in defaults:
-            keywords.append((word, argument))
-    radius = dict(keywords).get("radius")
-    if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
-        return replace(line, kind="rod", keywords=tuple((w, radius[0] if w == "radius" else v) for w, v in keywords))
-    return replace(line, keywords=tuple(keywords))
+def simplified(line: Line, numbers: dict[str, float]) -> Line:
+    """The line without keywords of zero, and of points, that change nothing that it draws, given the values of all
+    names."""
+    if isinstance(line, Part) or (isinstance(line, Group) and line.kind in ("divide", "row")):
+        for keywords in _shorter(line.keywords):
+            if _same(line, shorter := replace(line, keywords=keywords), numbers):
+                return simplified(shorter, numbers)
+    return line
+
+
+def _shorter(keywords: Keywords) -> Iterator[Keywords]:
+    """The keywords without one of zero, or one of a point that has more of them."""
+    for k, (word, argument) in enumerate(keywords):
+        before, behind = keywords[:k], keywords[k + 1 :]
+        if isinstance(argument, Point) and len(argument.keywords) > 1:
+            for pairs in combinations(argument.keywords, len(argument.keywords) - 1):
+                yield (*before, (word, Point(pairs)), *behind)
+        elif argument == 0:
+            yield (*before, *behind)
 
 
 def _has_box(line: Line) -> TypeGuard[Part | Group]:
     """Whether a line has a box and draws in it: a part, or a division, whose part has no other box."""
     return isinstance(line, Part) or (isinstance(line, Group) and line.kind == "divide")
-
-
-def _start(part: Part | Group) -> dict[str, Argument]:
-    """The keywords of the point that a part starts from, or of its box."""
-    start = dict(part.keywords).get("start")
-    return dict(start.keywords if isinstance(start, Point) else part.keywords)
-
-
-def _without(point: Argument, known: Mapping[str, Argument]) -> Point:
-    """A point without keywords whose values are known; with all of them if none is left."""
-    assert isinstance(point, Point)
-    return Point(tuple(pair for pair in point.keywords if known.get(pair[0]) != pair[1]) or point.keywords)
 
 
 def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...]:

@@ -53,7 +53,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     shared, table = _expressions(layout, solution, free, "diameter" if is_round else "")
     body, shared = _inlined(_changed(layout.body, table), shared)
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
-    body = changed_lines(body, simplified)
+    body = changed_lines(body, lambda line: simplified(line, known))
     body, shared = _inlined(grouped(body, known) if group else merged_lines(body), shared)
     names = named(body, shared, known)
     final: dict[str, Value] = {provisional: Name(name) for provisional, name in names.items()}

@@ -98,8 +98,7 @@ def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[So
     contacts, slots, free = _Contacts(layout, numbers), layout.slots, solution.free
     factors, values = solution.factors.copy(), numbers[free]
     for z, k in enumerate(free):
-        alone = np.count_nonzero(factors[k]) == 1  # not measured from another one
-        if slots[k].kind in ("extent", "angle") or np.count_nonzero(factors[:, z]) < 2 or not alone:
+        if slots[k].kind in ("extent", "angle") or np.count_nonzero(factors[:, z]) < 2:
             continue
         cost, lost = contacts.cost(factors[:, z], values[z])
         for _ in range(TIES.operations if cost else 0):

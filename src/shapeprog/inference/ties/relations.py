@@ -95,7 +95,6 @@ def worthwhile(
     *,
     low: FloatArray,
     bounded: FloatArray,
-    far: FloatArray | float = np.inf,
 ) -> tuple[FloatArray, FloatArray]:
     """The rows (M, V) of the selected relations, and the optimum (V,) where they hold.
 
@@ -114,10 +113,7 @@ def worthwhile(
         Price of a number, in the unit of the misfit.
     low, bounded
         Lower bounds (F,) of the products of these rows (F, V) with the numbers; no relation may violate them.
-    far
-        Farthest that relations together may move a number (V,): the quadratic model is valid near the optimum alone.
     """
-    start = numbers
     rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
     if not len(rows):
         return rows, numbers
@@ -139,7 +135,7 @@ def worthwhile(
         across = rows @ along
         off_then, spread_then = off - across * off[best] / spread[best], spread - across**2 / spread[best]
         edges_then = _edges(meeting, (spread_then <= minimum) & (np.abs(off_then) < HOLDS))
-        worse = (bounded @ moved < low).any() or (np.abs(moved - start) > far).any() or edges_then > edges
+        worse = (bounded @ moved < low).any() or edges_then > edges
         new = beside(rows[best], axes)
         if new is None or (worse and benefit[best] < np.inf):
             spread[best] = 0.0

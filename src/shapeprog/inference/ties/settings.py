@@ -17,7 +17,6 @@ class TieSettings:
     price: float = 3e-4  # of a free number, as a mean squared distance
     known_price: float = 1.2e-3  # the same in a program that somebody wrote (planted programs)
     known: float = 0.1  # weight of a squared move of a number that somebody wrote
-    far: float = 2.0  # farthest that relations may move a number at once
     rounds: int = 3  # most searches for relations: first contacts and parts on the floor, then all
     lost: float = 0.03  # largest decrease of closeness when numbers are tied
     cheaper: float = 3.0  # divides the price of a number where more is lost

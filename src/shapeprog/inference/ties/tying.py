@@ -149,8 +149,8 @@ class _Ties:
             ]  # fmt: skip
             candidates, before = [*(Relation(row, math.inf) for row in rows), *candidates], len(rows)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            low, bounded, far = self.layout.low, self.layout.jacobian, TIES.far / self.misfit.reach
-            rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded, far=far)
+            low, bounded = self.layout.low, self.layout.jacobian
+            rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded)
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)

@@ -81,7 +81,7 @@ def _expressions(
     for first, *others in alike.values():
         name = f"{names[first]}_sum"
         terms = [(atoms[z], float(factors[first, z])) for z in np.flatnonzero(factors[first])]
-        value = combined(0.0, sorted(terms, key=lambda term: term[1] < 0))
+        value = combined(0.0, terms)
         if others and isinstance(value, Expression) and not isinstance(value, Name):
             shared[name], value = value, Name(name)
         table |= {names[k]: value for k in (first, *others)}
@@ -157,8 +157,7 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
             *(use for outer in uses if name in names_in(wanted[outer]) for use in uses[outer]),
         ]
     words = language()
-    used = {*SIZES, "diameter", *RESERVED, *words.names, *words.roles, *(use.role for use, _ in every)}
-    used -= {"gap", "edge", "radius"}
+    used = {*SIZES, "diameter", *RESERVED, *words.names, *words.roles}
     values: dict[str, float] = {}  # of the names given
     result: dict[str, str] = {}
     for provisional in wanted:
@@ -170,7 +169,6 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
 
         shared, own = _candidates(uses[provisional], numbers)
         offered = [*shared, *(further(base) for base in shared if base in FURTHER), *own, *map(further, own)]
-        offered += (f"{use.role}_{use.word}" for use in uses[provisional] if use.word not in SIZES)
         offered += (f"{own[0]}_{count}" for count in range(2, len(wanted) + 2))
         result[provisional] = name = next(name for name in offered if name not in used | values.keys())
         values[name] = number

@@ -49,8 +49,8 @@ class Layout:
 
     Attributes
     ----------
-    sizes, extents
-        Width, depth and height of the whole, by name and in this order.
+    extents
+        Width, depth and height of the whole.
     lines, words, parts
         Its parts and loops, in the order of the text, their roles, or else kinds, and the numbers of those that are
         parts; upright round parts have a radius. A division stands for its part, with its role.
@@ -62,13 +62,10 @@ class Layout:
         All elements, by line, key and axis.
     slots, names
         The numbers (P,), the three sizes of the whole first, and their names.
-    forms
-        What each name is (P + 1,) where one of all numbers is 1 and the others are 0, and where all are 0: a linear
-        function of the numbers is given by these values of it.
     index
         The number of every line and keyword.
-    named, body, source
-        The parts and loops with names, as ``lines``; as lines of a program; and this program.
+    body, source
+        The parts and loops with names, and the program of these.
     numbers
         Where the numbers are at the start (P,).
     tunable, jacobian, low
@@ -77,7 +74,7 @@ class Layout:
     """
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None, *, divide: bool = True) -> None:
-        self.sizes: dict[str, float] = source.evaluated_numbers()
+        self._sizes: dict[str, float] = source.evaluated_numbers()
         drawing: list[Line] = []
         for line in source.lines:
             match line:
@@ -95,8 +92,8 @@ class Layout:
         self.parts = [index - self._divided(index) for index, _ in parts]
         self.filling = {index for index in self.parts if self._fills(self.lines[index])}
         if self.filling:
-            self.sizes["depth"] = self.sizes["width"]
-        self.extents = tuple(float(self.sizes[size]) for size in SIZES)
+            self._sizes["depth"] = self._sizes["width"]
+        self.extents = tuple(float(self._sizes[size]) for size in SIZES)
         last = [index + sum(1 for _ in Source((line,)).walk()) - 1 for index, line in enumerate(self.lines)]
         self.loops_around = [[loop for loop in range(n) if n <= last[loop]] for n in range(len(self.lines))]
         self.elements: dict[Key, Element] = {}
@@ -104,16 +101,18 @@ class Layout:
         self.slots = [Slot(-1, word, "extent", axis, self.extents[axis]) for axis, word in enumerate(SIZES)]
         self.index: dict[tuple[int, str], int] = {}
         self.names = [*SIZES]
-        self.named: list[Part | Group] = []
+        self._named: list[Part | Group] = []
         self.body = changed_lines(tree, self._with_names)
-        self.forms = dict(zip(self.names, np.eye(len(self.names) + 1), strict=False))
+        # What each name is (P + 1,) where one of all numbers is 1 and the others are 0, and where all are 0: a linear
+        # function of the numbers is given by these values of it.
+        self._forms = dict(zip(self.names, np.eye(len(self.names) + 1), strict=False))
         self._numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
         self.source = Source((Assignment(tuple(self._numbers.items())), *self.body), source.unit, source.scale)
         self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
         self.tunable, scale = Tunable(Program(expanded(self.source))), source.scale
         assert scale is not None
-        floor = scale.floor + (self.extents[2] - self.forms["height"]) * 0.5  # the middle of the whole stays
-        nodes = list(Program(symbolic(self.source, self.forms, (floor, scale.middle))).walk())
+        floor = scale.floor + (self.extents[2] - self._forms["height"]) * 0.5  # the middle of the whole stays
+        nodes = list(Program(symbolic(self.source, self._forms, (floor, scale.middle))).walk())
         values = np.zeros((len(self.tunable.moving), len(self.slots) + 1))
         for value, (n, slot) in zip(values, self.tunable.moving, strict=True):
             value += nodes[n].values[slot]
@@ -154,7 +153,7 @@ class Layout:
         for (index, key, axis), element in self.elements.items():
             if key == "across" and element.anchors != (LOW, HIGH):
                 continue
-            low, high = ends_of(self.named[index], key, axis, self._numbers, self.forms)
+            low, high = ends_of(self._named[index], key, axis, self._numbers, self._forms)
             if low[3:].any():
                 yield element, low[:-1], high[:-1]
 
@@ -170,15 +169,15 @@ class Layout:
                 moving, least = [(axis, way) for axis, way in ways if abs(way) >= TIES.touch], 0.0
             case Group("mirror", ((word, _),), (Part("box" | "cushion") as part,)) if axis_of(word) < 2:
                 axis, least, count = axis_of(word), TIES.divided, 2.0
-                plane, _ = ends_of(line, "plane", axis, self.sizes)
-                moving = [(axis, 2 * plane - sum(ends_of(part, "", axis, self.sizes)))]
+                plane, _ = ends_of(line, "plane", axis, self._sizes)
+                moving = [(axis, 2 * plane - sum(ends_of(part, "", axis, self._sizes)))]
             case _:
                 return line
         given = dict(part.keywords)
         if len(moving) != 1 or not given.keys().isdisjoint({"tilt", "lean"}):
             return line
         ((axis, away),) = moving
-        words, (low, high) = AXES[axis], ends_of(part, "", axis, self.sizes)
+        words, (low, high) = AXES[axis], ends_of(part, "", axis, self._sizes)
         size = high - low
         gap = abs(away) / (count - 1) - size
         if size < least or not -min(TIES.within, TIES.gap * size) < gap <= TIES.gap * size:
@@ -193,7 +192,7 @@ class Layout:
         arguments = dict(line.keywords) if isinstance(line, Part) else {}
         if not isinstance(line, Part) or line.kind not in ROUND or "start" in arguments:
             return line
-        ends = (ends_of(line, "", axis, self.sizes) for axis in range(2))
+        ends = (ends_of(line, "", axis, self._sizes) for axis in range(2))
         radius = arguments.get("radius", min(high - low for low, high in ends) / 2)
         left_out = {*SIZES[:2], "radius", *((*AXES[0], *AXES[1]) if self._fills(line) else ())}
         keywords = tuple(pair for pair in line.keywords if pair[0] not in left_out)
@@ -203,8 +202,8 @@ class Layout:
         """Whether a cylinder is nearly as wide as the whole."""
         if part.kind != "cylinder":
             return False
-        width, depth = self.sizes["width"], self.sizes["depth"]
-        (left, right), (front, rear) = (ends_of(part, "", axis, self.sizes) for axis in range(2))
+        width, depth = self._sizes["width"], self._sizes["depth"]
+        (left, right), (front, rear) = (ends_of(part, "", axis, self._sizes) for axis in range(2))
         off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
         return min(right - left, rear - front) > TIES.fills * width and off < TIES.off_middle * width
 
@@ -218,12 +217,12 @@ class Layout:
                 return None
             first, inner = self.first(index)
             away = max(1, round(float(line.count)) - 1) * float(step)  # type: ignore[arg-type]
-            low, high = ends_of(self.lines[first], inner, axis, self.sizes)
+            low, high = ends_of(self.lines[first], inner, axis, self._sizes)
             return low + away, high + away
         if key in ("plane", "centre") and keywords.keys().isdisjoint(AXES[axis]) and (key == "plane" or axis == 2):
             return None
-        ends = ends_of(line, key, axis, self.sizes)
-        if key in ("through", "end") and abs(ends[0] - ends_of(line, "start", axis, self.sizes)[0]) <= ALIGNED:
+        ends = ends_of(line, key, axis, self._sizes)
+        if key in ("through", "end") and abs(ends[0] - ends_of(line, "start", axis, self._sizes)[0]) <= ALIGNED:
             return None
         return ends
 
@@ -235,12 +234,12 @@ class Layout:
     def _with_names(self, line: Line) -> Line:
         """A line with a name for every number, measured from the anchors; lines are given in the order of the text."""
         assert isinstance(line, Part | Group)
-        index, kind = len(self.named), "row" if line.kind == "translate" else line.kind
+        index, kind = len(self._named), "row" if line.kind == "translate" else line.kind
         plain = [(word, self._plain(index, word, argument)) for word, argument in line.keywords
                  if word in KINDS and index not in self.filling]  # fmt: skip
         keywords = sorted((*self._placed(index), *plain), key=lambda pair: pair[0] != "gap")
-        self.named.append(replace(line, kind=kind, keywords=tuple(keywords)))
-        return self.named[-1]
+        self._named.append(replace(line, kind=kind, keywords=tuple(keywords)))
+        return self._named[-1]
 
     def _placed(self, index: int) -> Iterator[tuple[str, Argument]]:
         """The keywords of a line that are measured from sides, or across a bar."""
@@ -261,7 +260,7 @@ class Layout:
         """The keywords of a part in a box along an axis: clearances, size and offset, by its anchors."""
         line, words, extent = self.lines[index], AXES[axis], self.extents[axis]
         is_round = axis < 2 and line.kind in ROUND and index not in self.filling
-        ends = ends_of(line, "", axis, self.sizes)
+        ends = ends_of(line, "", axis, self._sizes)
         element = self._element(index, "", axis, "round" if is_round else "interval", ends)
         if len(set(element.anchors)) == 1:
             yield self._distance(element, element.anchors[0])
@@ -291,8 +290,8 @@ class Layout:
         """A size of a bar: a number, or the extent of the whole less two equal clearances."""
         bar, extent = self.lines[index], self.extents[axis]
         straight = abs(float(dict(bar.keywords).get("turn", 0))) <= TIES.degrees  # type: ignore[arg-type]
-        off = max(abs(ends_of(bar, key, axis, self.sizes)[0] - extent / 2) for key in ("start", "end"))
-        low, high = ends_of(bar, "across", axis, self.sizes)
+        off = max(abs(ends_of(bar, key, axis, self._sizes)[0] - extent / 2) for key in ("start", "end"))
+        low, high = ends_of(bar, "across", axis, self._sizes)
         if axis < 2 and straight and off < TIES.off_middle * extent:
             element = self._element(index, "across", axis, "interval", (low, high))
             if element.anchors == (LOW, HIGH):

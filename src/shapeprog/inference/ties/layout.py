@@ -166,9 +166,9 @@ class Layout:
         match line:
             case Group("translate", keywords, (Part("box" | "cushion") as part,), float(count)) if count > 1:
                 ways = ((axis_of(word), (count - 1) * float(step)) for word, step in keywords)  # type: ignore[arg-type]
-                moving, least = [(axis, way) for axis, way in ways if abs(way) >= TIES.touch], 0.0
+                moving = [(axis, way) for axis, way in ways if abs(way) >= TIES.touch]
             case Group("mirror", ((word, _),), (Part("box" | "cushion") as part,)) if axis_of(word) < 2:
-                axis, least, count = axis_of(word), TIES.divided, 2.0
+                axis, count = axis_of(word), 2.0
                 plane, _ = ends_of(line, "plane", axis, self._sizes)
                 moving = [(axis, 2 * plane - sum(ends_of(part, "", axis, self._sizes)))]
             case _:
@@ -180,7 +180,7 @@ class Layout:
         words, (low, high) = AXES[axis], ends_of(part, "", axis, self._sizes)
         size = high - low
         gap = abs(away) / (count - 1) - size
-        if size < least or not -min(TIES.within, TIES.gap * size) < gap <= TIES.gap * size:
+        if not -min(TIES.within, TIES.gap * size) < gap <= TIES.gap * size:
             return line
         box = {word: value for word, value in given.items() if word in BOX and word not in words}
         box |= {words.low: low + min(away, 0.0), words.size: size + abs(away)}

@@ -11,7 +11,6 @@ class TieSettings:
 
     # Layout
     gap: float = 0.25  # neighbours divide a box if the gap between them is at most this share of their size
-    divided: float = 2.0  # least size of a part that divides a box with its mirror image
 
     # Search
     price: float = 3e-4  # of a free number, as a mean squared distance

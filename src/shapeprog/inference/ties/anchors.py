@@ -159,11 +159,11 @@ class _AxisAnchors:
         stays = np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9
         lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
-        per_copy = stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
+        cost += stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
         growth = TIES.growth * self.extent
         grown = self._overlaps(below + growth * low, above + growth * high)
-        per_copy += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch).sum(1)
-        return cost + per_copy / max(1.0, low.shape[1] / len(elements))
+        cost += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch).sum(1)
+        return cost
 
 
 def _ends(scene: Scene, change: Float[Tensor, "N 16"]) -> FloatArray:

@@ -141,16 +141,15 @@ class _Contacts:
         self.pieces = self._pieces(np.ones(len(self.first), bool))
 
     def cost(self, along: FloatArray, value: float, least: float = np.inf) -> tuple[float, set[int]]:
-        """How many pieces more there are when a number of this value changes, and how many primitives without length,
-        counted up to the least so far; and the lines that lose contacts or length."""
+        """How many pieces more there are when a number of this value changes, counted up to the least so far; and the
+        lines that lose contacts."""
         total, lost = 0.0, set[int]()
         for factor in TIES.changes:
             if total < least:
                 scene = self.layout.scene(self.numbers + (factor - 1) * value * along)
-                invalid = np.flatnonzero((scene.bounds <= 0).any(1).numpy())
                 kept = gaps(boxes_of(scene), self.first, self.second) < TIES.touch
-                total += self._pieces(kept) - self.pieces + len(invalid)
-                lost |= {*self.line[[*invalid, *self.first[~kept], *self.second[~kept]]].tolist()}
+                total += self._pieces(kept) - self.pieces
+                lost |= {*self.line[[*self.first[~kept], *self.second[~kept]]].tolist()}
         return total, lost
 
     def _pieces(self, kept: Array) -> int:

@@ -242,7 +242,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
             trust = TIES.contact if "last" in keys else TIES.equal
             yield Relation(image, TIES.symmetric(axis), limit=TIES.askew) if same else Relation(image, trust)
     elif middles:
-        if touches and axis < 2 and any(points) and not single and not keys & {"last", "plane", "centre"}:
+        if touches and axis < 2 and any(points) and not single:
             yield Relation(row, TIES.straight)
     elif same:
         if first.key and second.key:  # both ends of a rod
@@ -256,7 +256,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
             yield Relation(row, TIES.equal)
     else:
         meet = face.facing * other.facing == -1
-        if touches and (meet or all(points) or bool(face.facing) != bool(other.facing)):
+        if touches and (face.facing != other.facing or all(points)):
             yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()))
         elif face.facing == other.facing and (single or touches):
             yield Relation(row, TIES.equal if single else TIES.equal / 2)

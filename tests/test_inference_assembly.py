@@ -312,16 +312,9 @@ def _drum(box: Box) -> list[float]:
     return [up - height / 2, depth, side, height, radius]
 
 
-@pytest.mark.parametrize("what", ["three points", "two places", "a line", "noise"])
-def test_what_has_no_surface_is_a_program_of_finite_numbers(what):
-    random = np.random.default_rng(0)
-    points = {
-        "three points": random.random((3, 3)),
-        "two places": np.repeat([[0.0, 0, 0], [1, 1, 1]], 50, 0),
-        "a line": np.linspace(0, 1, 200)[:, None] * [1.0, 2, 3],
-        "noise": random.random((300, 3)),
-    }[what]
-    found = sp.infer(shape_from_points(points, name=what, axes=np.eye(3)), blocks=2)
+def test_noise_is_a_program_of_finite_numbers():
+    points = np.random.default_rng(0).random((300, 3))
+    found = sp.infer(shape_from_points(points, name="noise", axes=np.eye(3)), blocks=2)
     assert found.program.blocks >= 1
     assert all(np.isfinite(node.values).all() for node in found.program.walk())
 

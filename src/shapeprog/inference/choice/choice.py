@@ -72,7 +72,7 @@ def _union(table: CoverageTable, indices: Sequence[int] | Array) -> Bits:
     """What the selected candidates cover together, less the points in the interior of one."""
     selected = list(indices)
     union: Bits = np.bitwise_or.reduce(table.rows[selected], axis=0, initial=0)
-    union[: table.evidence] &= ~np.bitwise_or.reduce(table.interior[selected], axis=0, initial=0)
+    union[: table.interior.shape[1]] &= ~np.bitwise_or.reduce(table.interior[selected], axis=0, initial=0)
     return union
 
 
@@ -80,7 +80,7 @@ def missed(table: CoverageTable, indices: tuple[int, ...]) -> Array:
     """The candidates that are not selected, ordered by how much of the unexplained points they would explain, less
     their prices."""
     rows = table.rows[:, : table.evidence]
-    done = np.bitwise_or.reduce((rows | table.interior)[list(indices)], axis=0, initial=0)
+    done = np.bitwise_or.reduce((rows | table.interior[:, : table.evidence])[list(indices)], axis=0, initial=0)
     gains = np.bitwise_count(rows & ~done) @ table.weights[: table.evidence] - table.prices
     order = np.argsort(-gains, kind="stable")
     return order[~np.isin(order, indices)]

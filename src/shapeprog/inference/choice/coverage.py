@@ -90,7 +90,9 @@ class CoverageTable(NamedTuple):
     rows: Bits
     weights: FloatArray  # value of a bit of each of the first E + N + F + K words, negative for free points
     evidence: int  # E, the number of words for points to be explained
-    interior: Bits  # points deeper inside each candidate than the tolerance (C, E): no other candidate explains them
+    interior: (
+        Bits  # points deeper inside each candidate than the tolerance (C, E + N): no other candidate explains them
+    )
     exposed: Bits  # unsupported samples of the surface of each candidate that it does not hide itself (C,)
     sample_price: FloatArray  # price of each of these samples (C,)
     prices: FloatArray  # price of the text of each candidate (C,)
@@ -136,7 +138,7 @@ class Coverage:
         covered, interior, samples, sampled, sample_price, price = (row[selected] for row in self._rows)
         _, hidden = covers(scene, sorted_by_cell(samples.reshape(-1, 3)), 0.0)
         exposed = np.array([2**number - 1 for number in sampled.tolist()], np.uint64) & ~hidden.diagonal()
-        bits, words = np.concatenate([covered, hidden], 1), interior.shape[1]
+        bits, words = np.concatenate([covered, hidden], 1), -(-len(self.evidence.points) // WORD)
         return CoverageTable(bits, self._weights, words, interior, exposed, sample_price, price)
 
     def _rows_of(self, candidates: Sequence[Program], scene: Scene) -> list[Array]:
@@ -146,9 +148,10 @@ class Coverage:
         price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
         explained, interior = covers(scene, self._points, evidence.tolerance, evidence.agreement)
         agreement = max(evidence.agreement, SETTINGS.agreement)
-        near, _ = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
+        near, deeper = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
         _, free = covers(scene, self._free, evidence.tolerance)
-        covered = np.concatenate([explained & ~interior, near, free, pack(parts_drawn(scene, evidence))], 1)
+        parts, interior = pack(parts_drawn(scene, evidence)), np.concatenate([interior, deeper], 1)
+        covered = np.concatenate([np.concatenate([explained, near], 1) & ~interior, free, parts], 1)
         points, owners, areas = unsupported(scene, evidence, self._surface)
         number = np.bincount(owners, minlength=len(candidates))[:, None]
         sampled, slot = np.minimum(number, WORD), np.arange(WORD)

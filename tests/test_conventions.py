@@ -20,7 +20,7 @@ FILES = sorted(SOURCE.rglob("*.py"))
 LONGEST = 400
 
 FLOORS = {
-    "errors": 0, "files": 0, "kernels": 0, "lazy_torch": 0, "space": 0,
+    "arguments": 0, "errors": 0, "files": 0, "kernels": 0, "lazy_torch": 0, "space": 0,
     "geometry": 1, "language": 2,
     "formats": 3, "data": 4, "library": 5, "inference": 5, "evaluation": 5, "view": 6, "cli": 6, "liang2022": 6,
     "__main__": 6,

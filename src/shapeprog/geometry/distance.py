@@ -14,6 +14,8 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from shapeprog.arguments import check_tensor
+from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import array, first_order, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch
@@ -108,8 +110,14 @@ class _UnionDistance(torch.autograd.Function):
 
 def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"]]:
     """Batch and points with one batch dimension."""
-    shape = points.shape[-2:]
-    return batch.flatten(), points.expand(*batch.batch_shape, *shape).reshape(-1, *shape)
+    check_tensor("points", points, "P", 3)
+    shape, lead = points.shape[-2:], tuple(batch.batch_shape)
+    try:
+        return batch.flatten(), points.expand(*lead, *shape).reshape(-1, *shape)
+    except RuntimeError:
+        cause = f"points of the shape {tuple(points.shape)} do not go with scenes of the shape {lead}"
+        wanted = f"({', '.join(map(str, (*lead, 'P', 3)))}) or (P, 3)" if lead else "(P, 3), or unroll a list"
+        raise ShapeProgError(cause, f"give the shape {wanted}") from None
 
 
 def _nearest(table: Array, points: Float[Tensor, "B P 3"]) -> Nearest:

@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from shapeprog.arguments import check_tensor
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
@@ -76,4 +77,7 @@ def excess(points: Cloud, target: Target, *, weights: Weights | None = None) -> 
 
 
 def _mean(values: Weights, weights: Weights | None) -> Values:
-    return values.mean(-1) if weights is None else (values * weights).sum(-1) / weights.sum(-1)
+    if weights is None:
+        return values.mean(-1)
+    check_tensor("weights", weights, *values.shape, lead=False)
+    return (values * weights).sum(-1) / weights.sum(-1)

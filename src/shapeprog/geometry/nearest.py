@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from shapeprog.arguments import check_tensor
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import neighbour_kernels as kernels
 from shapeprog.geometry.arrays import numbers, over_threads
@@ -44,9 +45,11 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
 
 def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
     """Both clouds with one batch dimension and of one type."""
+    for cloud in (queries, points):
+        check_tensor("cloud", cloud, "P", 3, empty=True)
     if not points.shape[-2]:
         raise ShapeProgError("there are no points to be near to", "give at least one point for each shape")
-    if queries.shape[:-2] != points.shape[:-2] or queries.shape[-1] != 3 or points.shape[-1] != 3:
+    if queries.shape[:-2] != points.shape[:-2]:
         message = f"clouds of shapes {tuple(queries.shape)} and {tuple(points.shape)} do not pair up"
         raise ShapeProgError(message, "both must be (..., points, 3) with the same leading dimensions")
     count = queries.shape[:-2].numel()

@@ -17,9 +17,11 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
+from shapeprog.arguments import check_number
 from shapeprog.data.loading import load
 from shapeprog.data.shape import Shape
 from shapeprog.data.touched import occupied
+from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.inference.assembly import assemble
@@ -150,10 +152,14 @@ def infer(
     InputError
         If the path is no readable shape.
     ShapeProgError
-        If there is no such unit.
+        If there is no such unit, or another argument has no meaning.
     """
     if unit not in ("", CELLS):
         metres(unit)
+    check_number("blocks", blocks, 0, whole=True)
+    check_number("detail", detail, 0, above=True)
+    if statements not in ("all", "paper"):
+        raise ShapeProgError(f"unknown statements {statements!r}", "choose all or paper")
     target = shape if isinstance(shape, Shape) else load(shape)
     prepare_kernels(cells=statements == "paper" or target.points is None)
     started = time.monotonic()

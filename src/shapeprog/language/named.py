@@ -99,8 +99,9 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
         if name not in declared:
             hint = did_you_mean(name, declared) if declared else "it has no names: write name = number at its top"
             raise ShapeProgError(f"this program has no name {name!r}", hint)
-        if not abs(replacements[name]) <= LARGEST:  # true of NaN, too
-            message = f"{name} = {replacements[name]:g} is too large for single precision, or not finite"
+        number = replacements[name]
+        if not hasattr(number, "__float__") or not abs(number) <= LARGEST:  # true of NaN, too
+            message = f"{name} = {number!r} is no number, not finite, or too large for single precision"
             raise ShapeProgError(message, "write one such as 12.5")
     try:
         return evaluated(replace(source, lines=tuple(_set(line, replacements) for line in source.lines)))

@@ -12,15 +12,19 @@ from typing import Any
 
 from jaxtyping import Float, Int
 
+from shapeprog.arguments import check_tensor
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Source
 from shapeprog.language.evaluate import symbolic
 from shapeprog.language.expression import Linear
 from shapeprog.language.named import names
+from shapeprog.language.parameters import LARGEST, Quantity
 from shapeprog.language.program import Program
-from shapeprog.language.statement import language
+from shapeprog.language.statement import Statement, language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.lazy_torch import Tensor, torch
+
+ROUNDING = 1e-5  # cells by which a length may be negative, as one of zero may come out
 
 
 class Parametric:
@@ -54,6 +58,8 @@ class Parametric:
         self.code = encode(program, dtype=torch.float64)
         moving = self._moving(dict(zip(self.names, self.values, strict=True)))
         self.slots = torch.tensor(list(moving), dtype=torch.long)
+        lengths = [self._place(slot)[2].kind == "length" for slot in moving]
+        self._least = torch.tensor([-ROUNDING if length else -LARGEST for length in lengths], dtype=torch.float64)
         self.matrix = self.offset = None
         try:
             forms = list(self._moving({name: Linear.of(name) for name in self.names}).values()) if moving else []
@@ -65,17 +71,44 @@ class Parametric:
         self.offset = torch.tensor([form.constant for form in forms], dtype=torch.float64)
 
     def at(self, values: Float[Tensor, "*batch F"]) -> Code:
-        """The program for other values of its names, one for each entry of a batch, with gradient."""
+        """The program for other values of its names, one for each entry of a batch, with gradient.
+
+        Raises
+        ------
+        ShapeProgError
+            If these are no values, as many as there are names, in float32 or float64; and, where no gradient is
+            recorded, if they make a length negative or a number not finite.  Where one is, unrolling leads short
+            lengths back above zero, see :func:`~shapeprog.language.unroll.unroll`.
+        """
+        check_tensor("values", values, len(self.names))
         if self.matrix is not None and self.offset is not None:
             numbers = self.offset.to(values) + values @ self.matrix.to(values).T
         else:
             result = self._moving(dict(zip(self.names, values.unbind(-1), strict=True)))
             numbers = torch.stack(list(result.values()), -1)
+        if not (torch.is_grad_enabled() and numbers.requires_grad):
+            self._check(numbers)
         lead, original = values.shape[:-1], self.code.parameters
         flat = original.to(values).flatten().expand(*lead, -1).index_copy(-1, self.slots.to(values.device), numbers)
         ids, roles = self.code.ids.expand(*lead, *self.code.ids.shape), self.code.roles
         roles = None if roles is None else roles.expand(*lead, *roles.shape)
         return Code(ids, flat.reshape(*lead, *original.shape), roles)
+
+    def _check(self, numbers: Float[Tensor, "*batch M"]) -> None:
+        """Refuse numbers in ``slots`` that are not finite, and lengths among them that are negative."""
+        good = (numbers >= self._least.to(numbers)) & (numbers <= LARGEST)  # neither is true of NaN
+        if not bool(good.all()):
+            index = tuple((~good).nonzero()[0].tolist())
+            block, statement, quantity = self._place(int(self.slots[index[-1]]))
+            message = f"a {quantity.kind} of {statement.name} in block {block + 1} is {numbers[index]:g}"
+            entry = f" in entry {', '.join(map(str, index[:-1]))}" if index[:-1] else ""
+            raise ShapeProgError(f"{message} with these values{entry}", "lengths are not negative, and numbers finite")
+
+    def _place(self, slot: int) -> tuple[int, Statement, Quantity]:
+        """Block, statement and quantity of a number among all."""
+        row, place = divmod(slot, self.code.parameters.shape[-1])
+        statement = language()[int(self.code.ids.flatten()[row])]
+        return row // self.code.ids.shape[-1], statement, statement.quantities[place]
 
     def _moving(self, scope: Mapping[str, Any]) -> dict[int, Any]:
         """The continuous numbers that depend on names, by their place among all, for these values of the names."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import reprlib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,6 +29,13 @@ class Code:
     parameters: Float[Tensor, "*steps slots"]
     roles: Int[Tensor, ...] | None = None
 
+    def __post_init__(self) -> None:
+        kind, sizes, ids = str(self.parameters.dtype), tuple(self.parameters.shape), tuple(self.ids.shape)
+        if kind.endswith("float16"):
+            raise ShapeProgError(f"parameters hold {kind}", "give float32 or float64, as parameters.float() does")
+        if sizes[:-1] != ids:
+            raise ShapeProgError(f"parameters have the shape {sizes}, ids {ids}", "give a row of slots for each id")
+
     def __getitem__(self, index: Any) -> Code:
         """The part at an index of the leading dimensions: an integer, a slice, a mask, or a tuple of these."""
         return Code(self.ids[index], self.parameters[index], None if self.roles is None else self.roles[index])
@@ -46,7 +54,10 @@ def encode(
     longest program has, or as are asked for; a ``ShapeProgError`` if a program has more.  There are as many slots as
     the longest statement takes, at least the published seven.
     """
-    batch = [programs] if isinstance(programs, Program) else list(programs)
+    batch = list(programs) if isinstance(programs, Iterable) else [programs]
+    if not all(isinstance(program, Program) for program in batch):
+        message = f"{reprlib.repr(programs)} is no program, and no list of programs"
+        raise ShapeProgError(message, "read text with parse, and a file with load")
     chains = [program.chains for program in batch]
     needed = max([0, *map(len, chains)])
     steps = max([PUBLISHED_DEPTH, *(len(chain) for program in chains for chain in program)])

@@ -1,0 +1,44 @@
+"""Checks of what a caller gives, where a public function is entered."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from shapeprog.errors import ShapeProgError
+
+
+def check_number(
+    name: str, value: Any, least: float, most: float = math.inf, *, whole: bool = False, above: bool = False
+) -> None:
+    """Raise a ``ShapeProgError`` unless a value is a finite number from ``least``, or ``above`` it, to ``most``."""
+    number = float(value) if hasattr(value, "__index__" if whole else "__float__") else math.nan
+    if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
+        bounds = f"above {least:g}" if above else f"of {least:g} or more"
+        bounds += f", at most {most:g}" if most < math.inf else ""
+        raise ShapeProgError(f"{name} is {value!r}", f"give a {'whole ' if whole else ''}number {bounds}")
+
+
+def check_tensor(
+    name: str, value: Any, *shape: int | str, lead: bool = True, floating: bool = True, empty: bool = False
+) -> None:  # fmt: skip
+    """Raise a ``ShapeProgError`` unless a value is a tensor whose shape ends as given, such as ``"P", 3``.
+
+    A word stands for any size, which is not 0 unless it may be ``empty``.  Without ``lead`` there are no dimensions
+    before those.  A ``floating`` tensor holds float32 or float64.
+    """
+    import torch
+
+    if not isinstance(value, torch.Tensor):
+        raise ShapeProgError(f"{name} is no tensor but {type(value).__name__}", f"give torch.as_tensor({name})")
+    if floating and value.dtype not in (torch.float32, torch.float64):
+        raise ShapeProgError(f"{name} holds {value.dtype}", f"give float32 or float64, as {name}.float() does")
+    sizes = tuple(value.shape)
+    found = sizes[max(0, len(sizes) - len(shape)) :] if lead else sizes
+    right = (
+        size > 0 or empty if isinstance(one, str) else size == one for size, one in zip(found, shape, strict=False)
+    )
+    if len(found) != len(shape) or not all(right):
+        wanted = " x ".join(map(str, ["...", *shape] if lead else shape))
+        letters = "" if empty or all(isinstance(one, int) for one in shape) else ", 1 or more of each letter"
+        raise ShapeProgError(f"{name} has the shape {sizes}", f"give the shape {wanted}{letters}")

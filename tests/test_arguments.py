@@ -1,0 +1,111 @@
+"""Wrong arguments of public functions are errors of the package, which name the argument and the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+import shapeprog as sp
+from shapeprog.arguments import check_number
+from shapeprog.language.parser import parse
+
+pytestmark = pytest.mark.wrong_types
+
+TEXT = """# unit: cm
+width, depth, height = 60, 60, 90
+seat_bottom = 47
+leg(left=0, width=4, front=0, depth=4, bottom=0, height=seat_bottom)
+seat(bottom=seat_bottom, height=4)
+"""
+PROGRAM = parse(TEXT)
+CHAIR = sp.Parametric(PROGRAM)
+CODE = sp.encode([PROGRAM])
+SCENE, SCENES = sp.unroll(PROGRAM), sp.unroll([PROGRAM] * 2)
+POINTS = torch.zeros(5, 3)
+BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: sp.coverage(SCENE, POINTS[:, :2]), r"points has the shape \(5, 2\)\n  hint: give the shape .* P x 3"),
+        (lambda: sp.coverage(SCENE, POINTS[0]), r"points has the shape \(3,\)"),
+        (lambda: sp.coverage(SCENE, POINTS[:0]), r"points has the shape \(0, 3\)\n.* 1 or more"),
+        (lambda: sp.coverage(SCENE, POINTS.numpy()), r"points is no tensor but ndarray\n  hint: give torch.as_tensor"),
+        (lambda: sp.coverage(SCENE, POINTS.long()), r"points holds torch.int64\n.* points\.float\(\)"),
+        (lambda: sp.coverage(SCENE, POINTS.bfloat16()), r"points holds torch.bfloat16"),
+        (lambda: sp.coverage(SCENE, POINTS.expand(2, 5, 3)), r"\(2, 5, 3\) do not go with .* \(\)\n.* unroll a list"),
+        (lambda: sp.coverage(SCENES, POINTS.expand(3, 5, 3)), r"do not go with .* \(2,\)\n.* \(2, P, 3\) or \(P, 3\)"),
+        (lambda: SCENE.distance(POINTS[:, :2]), r"points has the shape \(5, 2\)"),
+        (lambda: sp.chamfer(POINTS.numpy(), POINTS), "cloud is no tensor but ndarray"),
+        (lambda: sp.chamfer(POINTS, POINTS[0]), r"cloud has the shape \(3,\)"),
+        (lambda: sp.chamfer(POINTS.long(), POINTS), "cloud holds torch.int64"),
+        (lambda: sp.chamfer(POINTS, POINTS, weights=torch.ones(4)), r"weights has the shape \(4,\)\n.* the shape 5$"),
+        (lambda: sp.chamfer(POINTS, POINTS, target_weights=torch.ones(2, 5)), r"weights has the shape \(2, 5\)"),
+        (lambda: sp.unroll("leg()"), r"'leg\(\)' is no program, and no list of programs\n.* with parse"),
+        (lambda: sp.unroll(None), "None is no program"),
+        (lambda: sp.unroll([CODE]), "is no program"),
+        (lambda: sp.set(PROGRAM, seat_bottom="47"), "seat_bottom = '47' is no number"),
+        (lambda: sp.set(PROGRAM, seat_bottom=None), "seat_bottom = None is no number"),
+        (lambda: CHAIR.at(torch.ones(3)), r"values has the shape \(3,\)\n.* x 4$"),
+        (lambda: CHAIR.at(torch.tensor(1.0)), r"values has the shape \(\)"),
+        (lambda: CHAIR.at(torch.ones(4).long()), r"values holds torch.int64"),
+        (lambda: CHAIR.at(torch.ones(4).half()), r"values holds torch.float16"),
+        (lambda: CHAIR.at(np.ones(4)), "values is no tensor but ndarray"),
+        (lambda: sp.unroll(CODE.having(CODE.parameters.half())), "parameters hold torch.float16"),
+        (lambda: sp.unroll(CODE.having(CODE.parameters.bfloat16())), r"parameters hold torch.bfloat16\n.* float32"),
+        (lambda: replace(CODE, parameters=CODE.parameters[:, :1]), r"parameters have the shape .*, ids \(1, 2, 3\)"),
+        (lambda: sp.infer(BENCH, detail=0), "detail is 0\n  hint: give a number above 0$"),
+        (lambda: sp.infer(BENCH, detail=float("nan")), "detail is nan"),
+        (lambda: sp.infer(BENCH, blocks=-1), "blocks is -1\n  hint: give a whole number of 0 or more$"),
+        (lambda: sp.infer(BENCH, blocks=2.5), "blocks is 2.5"),
+        (lambda: sp.infer(BENCH, statements="foo"), "unknown statements 'foo'\n  hint: choose all or paper"),
+    ],
+)  # fmt: skip
+def test_a_wrong_argument_is_named_with_its_remedy(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises(sp.ShapeProgError, match=message):
+        call()
+
+
+def test_right_arguments_pass() -> None:
+    assert sp.coverage(SCENES, POINTS).shape == sp.coverage(SCENES, POINTS.expand(2, 5, 3)).shape == (2,)
+    assert sp.coverage(SCENES, POINTS.expand(1, 5, 3)).shape == (2,)
+    assert sp.chamfer(POINTS, POINTS, weights=torch.ones(5)) == 0
+    assert sp.unroll(program for program in [PROGRAM]).mask.sum() == 2  # type: ignore[arg-type]
+    assert sp.set(PROGRAM, seat_bottom=torch.tensor(40.0)) == sp.set(PROGRAM, seat_bottom=np.int64(40))  # type: ignore[arg-type]
+    check_number("a share", np.float32(1), 0, 1)
+    check_number("a count", np.int64(3), 1, whole=True)
+
+
+@pytest.mark.parametrize("factor", [-1.0, torch.nan, torch.inf])
+def test_values_that_no_program_can_have_are_refused_but_where_a_gradient_is_recorded(factor: float) -> None:
+    with pytest.raises(sp.ShapeProgError, match=r"a (length|position) of box in block 1 is (-|nan|inf)"):
+        CHAIR.at(CHAIR.values * factor)
+    with pytest.raises(sp.ShapeProgError, match="in entry 1\n"):
+        CHAIR.at(torch.stack([CHAIR.values, CHAIR.values * factor]))
+    recorded = (CHAIR.values * factor).requires_grad_()
+    assert CHAIR.at(recorded).parameters.requires_grad
+    with torch.no_grad(), pytest.raises(sp.ShapeProgError):
+        CHAIR.at(recorded)
+
+
+def test_a_negative_length_that_is_recorded_is_drawn_and_grows() -> None:
+    values = CHAIR.values.clone()
+    values[CHAIR.names.index("seat_bottom")] = -1.0
+    scene = sp.unroll(CHAIR.at(values.requires_grad_()))
+    assert scene.mask.all()
+    assert float(scene.size[:, :3].detach().min()) == pytest.approx(0.1)
+
+
+def test_zero_is_a_length() -> None:
+    text = TEXT.replace("seat_bottom = 47", "tip, seat_bottom = 0, 47").replace(
+        "leg(", "taper(bottom=0, height=5, radius=(4, tip))\nleg("
+    )
+    cone = sp.Parametric(parse(text))
+    assert sp.unroll(cone.at(cone.values)).mask.sum() == 3

@@ -121,9 +121,33 @@ def test_a_loss_that_is_not_finite_ends_the_run(tmp_path: Path):
     toy = Toy()
     with torch.no_grad():
         toy.module[4].bias.fill_(torch.nan)
-    with pytest.raises(ShapeProgError, match=r"the loss of step 1 is nan.*\n.*lower the learning rate"):
+    with pytest.raises(ShapeProgError, match=r"the loss of step 1 is nan.*\n.*lower learning rate.* of step 0$"):
         run(tmp_path, task=toy)
     assert not (tmp_path / WEIGHTS).exists()
+    assert state(tmp_path)["step"] == 0
+
+
+def test_the_error_of_a_run_that_diverges_says_what_its_folder_holds(tmp_path: Path):
+    wild = replace(TOY, learning_rate=1e18, warm_up=0, clip_norm=0.0)
+    with pytest.raises(ShapeProgError, match=r"the loss of step [2-9] is .*\n.* holds the state of step 0$"):
+        run(tmp_path, settings=wild)
+    begun = state(tmp_path)
+    assert (begun["step"], begun["optimiser"]["state"]) == (0, {})  # type: ignore[index]
+    assert same(begun["module"], Toy().module.state_dict())
+    assert len(list(train(Toy(), TOY, tmp_path, device="cpu", restart=True))) == 20
+
+
+def test_a_run_that_is_killed_before_its_first_step_begins_again_as_it_was(tmp_path: Path):
+    going = train(Toy(), TOY, tmp_path / "killed", device="cpu")
+    next(going)
+    going.close()
+    assert state(tmp_path / "killed")["step"] == 0
+    other = Toy()
+    with torch.no_grad():
+        other.module[4].bias.fill_(7.0)  # as if another start had been drawn
+    run(tmp_path / "killed", task=other)
+    run(tmp_path / "whole")
+    assert untimed(tmp_path / "killed") == untimed(tmp_path / "whole")
 
 
 def test_weights_are_written_at_each_validation_and_the_best_kept(tmp_path: Path):

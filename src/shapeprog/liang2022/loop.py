@@ -68,12 +68,12 @@ def train(
 ) -> Iterator[Record]:  # fmt: skip
     """Train, yielding one record per step.
 
-    The folder gets ``state.pt`` (weights, optimiser, step, settings), ``log.jsonl``, and after each validation
-    ``weights.safetensors``, and ``best.safetensors`` where the score is the best so far.  A run in it is resumed, or
-    with ``restart`` overwritten.  The device is ``auto``, ``cpu`` or ``cuda``.  Once ``stop`` is set, the state is
-    saved after the current step and training ends.  The card of the weights holds ``command``.  Raises a
-    ``ShapeProgError`` if the saved run has other settings, another process trains there, the loss is not finite, or a
-    file cannot be written; the last state stays.
+    The folder gets ``state.pt`` (weights, optimiser, step, settings) before the first step, every two minutes and at
+    the end, ``log.jsonl``, and after each validation ``weights.safetensors``, and ``best.safetensors`` where the score
+    is the best so far.  A run in it is resumed, or with ``restart`` overwritten.  The device is ``auto``, ``cpu`` or
+    ``cuda``.  Once ``stop`` is set, the state is saved after the current step and training ends.  The card of the
+    weights holds ``command``.  Raises a ``ShapeProgError`` if the saved run has other settings, another process trains
+    there, the loss is not finite, or a file cannot be written; the last state stays.
     """
     rank, world, where = _processes(device)
     module = task.module.to(where).to(memory_format=torch.channels_last_3d).train()  # type: ignore[call-overload]
@@ -90,7 +90,16 @@ def train(
         if rank == 0:
             records = [record for record in read_log(folder / LOG) if record["step"] <= step] if step else []
             write_text(folder / LOG, "".join(f"{json.dumps(record)}\n" for record in records))
-        saved_at = clock = time.monotonic()
+
+        def save_state() -> tuple[int, float]:
+            state: dict[str, Any] = {"settings": asdict(settings), "step": step, "best": best}
+            state |= {"module": module.state_dict(), "optimiser": optimiser.state_dict()}
+            torch.save(state, content := io.BytesIO())
+            write_bytes(folder / STATE, content.getvalue())
+            return step, time.monotonic()
+
+        saved, saved_at = save_state() if rank == 0 and not step else (step, time.monotonic())
+        clock = time.monotonic()
         for batch in _prefetch(task.batch, range(step * world + rank, steps * world, world)):
             for group in optimiser.param_groups:
                 group["lr"] = settings.learning_rate_at(step * together)
@@ -111,7 +120,8 @@ def train(
             total, stopped, *parts = values.tolist()
             if not math.isfinite(total + norm):
                 cause = f"the loss of step {step + 1} is {total}, the norm of its gradient {norm}"
-                raise ShapeProgError(cause, f"lower the learning rate; {folder} holds the state before")
+                cure = f"start over with --restart and a lower learning rate; {folder} holds the state of step {saved}"
+                raise ShapeProgError(cause, cure)
             optimiser.step()
             step += 1
             record = {"step": step, "samples_seen": step * together, "loss": total, "gradient_norm": norm}
@@ -132,11 +142,7 @@ def train(
                     best = max(best, scores.get("score", -math.inf))
                 append_line(folder / LOG, json.dumps({k: v for k, v in record.items() if math.isfinite(v)}))
                 if last or stopped or time.monotonic() - saved_at >= SAVE_SECONDS:
-                    state: dict[str, Any] = {"settings": asdict(settings), "step": step, "best": best}
-                    state |= {"module": module.state_dict(), "optimiser": optimiser.state_dict()}
-                    torch.save(state, content := io.BytesIO())
-                    write_bytes(folder / STATE, content.getvalue())
-                    saved_at = time.monotonic()
+                    saved, saved_at = save_state()
             yield record
             if stopped:
                 return

@@ -233,6 +233,39 @@ def test_what_cannot_be_adapted_is_an_error_before_it_begins(room: Path, tmp_pat
     tian2019 = str(room / "tian2019.safetensors")
     refuse(room, r"the design tian2019 has no offsets\n.*--learn all", learn="offsets", initial=tian2019)
     refuse(room, "ids cannot learn", learn="offsets", estimator="rloo")
+    scene = r"the losses coverage=1 are those of direct adaptation, and the method is {}\n.*--method direct"
+    for method in ("guided", "hybrid"):
+        refuse(room, scene.format(method), method, loss="coverage=1")
+    refuse(room, "those of guided adaptation, and the method is direct", loss="neural=1")
+    refuse(room, "those of hybrid adaptation, and the method is guided", "guided", loss="neural=1,chamfer=1")
+
+
+@pytest.mark.wrong_types
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"points": 0}, "points is 0\n  hint: give a whole number of 1 or more"),
+        ({"num_shapes": 10.5}, "num_shapes is 10.5\n  hint: give a whole number"),
+        ({"num_shapes": "10"}, "num_shapes is '10'"),
+        ({"rehearsal": 0.5}, "rehearsal is 0.5"),
+        ({"learning_rate": float("nan")}, "learning_rate is nan\n  hint: give a number of 0 or more"),
+        ({"kl": -1}, "kl is -1"),
+        ({"beta1": 1.5}, "beta1 is 1.5\n  hint: give a number of 0 or more, at most 1"),
+        ({"train": "few.npz"}, "train is 'few.npz'\n  hint: give a tuple"),
+        ({"initial": 5}, "initial is 5"),
+    ],
+)
+def test_settings_check_themselves(options: dict[str, Any], message: str):
+    with pytest.raises(ShapeProgError, match=message):
+        AdaptSettings(**{"train": ("few.npz",), **options})
+
+
+def test_a_stream_of_nothing_is_refused(room: Path):
+    for options in ({"batch_size": 0}, {"points": 0}):
+        with pytest.raises(ShapeProgError, match=r"is 0\n  hint: give a whole number of 1 or more"):
+            TargetStream([room / "few.npz"], **options)
+    with pytest.raises(ShapeProgError, match="index is -1"):
+        TargetStream([room / "few.npz"])[-1]
 
 
 def test_programs_that_draw_nothing_cost_but_have_no_gradient(room: Path):

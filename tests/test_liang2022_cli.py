@@ -93,6 +93,8 @@ def test_a_users_loss_adapts_and_an_interrupted_run_is_resumed_by_the_same_comma
         ([*ADAPT.split(), "--methd", "direct"], "No such option"),
         ([*ADAPT.split(), "--method", "dirct"], "unknown method 'dirct'"),
         ([*ADAPT.split(), "--loss", "chamfr"], "did you mean 'chamfer'?"),
+        ([*ADAPT.split(), "--method", "guided", "--loss", "coverage=1"], "those of direct adaptation"),
+        ([*ADAPT.split(), "--loss", "neural=1"], "those of guided adaptation, and the method is direct"),
         ([*ADAPT.split(), "--learn", "some"], "unknown learn 'some'"),
         ([*ADAPT.split(), "--device", "gpu"], "unknown device 'gpu'"),
         ([*ADAPT.split(), "--with", "gone.py"], "there is no file gone.py"),

@@ -9,6 +9,7 @@ from torch import Tensor
 from torch.nn.functional import max_pool3d
 
 from shapeprog.data.packs import read_pack
+from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.cells import count, unpack
 from shapeprog.language import encode
 from shapeprog.language.parser import parse
@@ -54,6 +55,26 @@ def test_novel_ends_rather_than_write_a_block_that_draws_nothing_new():
     assert writes.any()
     still = decoded("argmax")
     assert ((still.code.ids > 0).any(-1) & (count(draw_blocks(still.code) & ~still.canvases) == 0)).any()
+
+
+@pytest.mark.wrong_types
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        (
+            torch.zeros(1, 16, 16, 16),
+            r"target has the shape \(1, 16, 16, 16\)\n  hint: give the shape B x 32 x 32 x 32",
+        ),
+        (torch.zeros(32, 32, 32), r"target has the shape \(32, 32, 32\)"),
+        (torch.zeros(0, 32, 32, 32), r"target has the shape \(0, 32, 32, 32\)\n.* 1 or more"),
+        (torch.zeros(1, 32, 32, 32).numpy(), "target is no tensor but ndarray"),
+    ],
+)
+def test_targets_of_another_shape_are_refused(target: Tensor, message: str):
+    with pytest.raises(ShapeProgError, match=message):
+        decode(small(), target)
+    with pytest.raises(ShapeProgError, match="blocks is -1"):
+        decode(small(), targets(1), blocks=-1)
 
 
 def widened(cells: Tensor) -> Tensor:

@@ -29,6 +29,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
+from shapeprog.arguments import check_number
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.surface import face_areas
@@ -65,6 +66,8 @@ class TargetStream:
     """Endless batches of real shapes, a function of packs, seed and index; all shapes once before any comes again."""
 
     def __init__(self, packs: Sequence[str | Path], batch_size: int = 32, points: int = 1000, seed: int = 0) -> None:
+        check_number("batch_size", batch_size, 1, whole=True)
+        check_number("points", points, 1, whole=True)
         self._shapes = [(pack, index) for pack in map(read_pack, map(Path, packs)) for index in range(len(pack))]
         if not self._shapes:
             raise ShapeProgError("there are no shapes to adapt to", "give packs made with: shapeprog prepare")
@@ -72,6 +75,7 @@ class TargetStream:
 
     def __getitem__(self, index: int) -> Targets:
         """The batch of an index, 0 or more."""
+        check_number("index", index, 0, whole=True)
         count, rng, cells, points = len(self._shapes), np.random.default_rng((self._seed, 1, index)), [], []
         for number in range(index * self._batch_size, (index + 1) * self._batch_size):
             order = np.random.default_rng((self._seed, 0, number // count)).permutation(count)
@@ -89,6 +93,10 @@ class AdaptTask:
     def __init__(self, settings: AdaptSettings) -> None:
         torch.manual_seed(settings.seed)
         self._settings, self._losses = settings, parse_losses(settings.loss or METHODS[settings.method])
+        method = "direct" if NEURAL not in self._losses else "hybrid" if len(self._losses) > 1 else "guided"
+        if method != settings.method:
+            cause = f"the losses {settings.loss} are those of {method} adaptation, and the method is {settings.method}"
+            raise ShapeProgError(cause, f"give --method {method}, or other losses")
         packs = ", ".join(Path(pack).stem for pack in settings.train)
         self.data = f"{Path(settings.initial).stem}, adapted to {packs}"
         generator = load_generator(settings.initial)

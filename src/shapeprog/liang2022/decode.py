@@ -17,6 +17,7 @@ import torch
 from jaxtyping import Float, Int, UInt8
 from torch import Tensor
 
+from shapeprog.arguments import check_number, check_tensor
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.geometry.cells import count, iou, pack, unpack
 from shapeprog.language import Code, Program, unroll
@@ -33,7 +34,7 @@ from shapeprog.liang2022.generator import (
     union,
 )
 from shapeprog.liang2022.settings import Decoder
-from shapeprog.space import HALF
+from shapeprog.space import HALF, RESOLUTION
 
 AnyDecoder = Literal[Decoder, "sample", "sample-ids"]
 
@@ -65,8 +66,10 @@ def decode(
     """Decode a program of at most so many blocks K for each target, by a generator in evaluation mode.
 
     ``rng`` is the source of randomness for sampling, a fixed one by default.  Raises a ``ShapeProgError`` if there is
-    no such decoder.
+    no such decoder, or the target has another shape.
     """
+    check_tensor("target", target, "B", *[RESOLUTION] * 3, lead=False, floating=False)
+    check_number("blocks", blocks, 0, whole=True)
     if decoder not in get_args(AnyDecoder):
         raise ShapeProgError(f"unknown decoder {decoder!r}", did_you_mean(decoder, get_args(AnyDecoder)))
     size, device = len(target), target.device

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
+from shapeprog.arguments import check_number
 from shapeprog.errors import ShapeProgError
 
 NEURAL = "neural"  # reserved name of the loss through the neural executor, which compares predictions and not scenes
 METHODS = {"direct": "chamfer", "guided": f"{NEURAL}=30", "hybrid": f"chamfer=1,{NEURAL}=10"}  # their losses
 STATE, WEIGHTS, BEST, LOG = "state.pt", "weights.safetensors", "best.safetensors", "log.jsonl"  # files of a run
 Decoder = Literal["argmax", "novel", "select"]  # how programs are written; see decode.py
+AT_LEAST_ONE, SHARES = ("num_shapes", "batch_size", "points"), ("beta1", "scheduled_sampling", "widened")
 Order = Literal["coverage", "written"]  # of the blocks in teacher forcing; see pretrain.py
 
 
@@ -42,10 +44,11 @@ class TrainingSettings:
         for name, value in asdict(self).items():
             if get_origin(hints[name]) is Literal and value not in get_args(hints[name]):
                 raise ShapeProgError(f"unknown {name} {value!r}", f"choose one of {', '.join(get_args(hints[name]))}")
-            if isinstance(value, (int, float)) and not (math.isfinite(value) and value >= 0):
-                raise ShapeProgError(f"{name} is {value}", "give a number that is not negative")
-            if name in ("num_shapes", "batch_size") and value < 1:
-                raise ShapeProgError(f"{name} is {value}", "give 1 or more")
+            if hints[name] in (int, float):
+                least, most = name in AT_LEAST_ONE, 1 if name in SHARES else math.inf
+                check_number(name, value, least, most, whole=hints[name] is int)
+            elif isinstance(value, str) == (get_origin(hints[name]) is tuple):
+                raise ShapeProgError(f"{name} is {value!r}", f"give a {'tuple' if isinstance(value, str) else 'text'}")
 
     def learning_rate_at(self, samples_seen: int) -> float:
         """Learning rate after so many shapes."""
@@ -109,8 +112,12 @@ class AdaptSettings(TrainingSettings):
     train: tuple[str, ...] = option((), "Packs of the shapes to adapt to.")
     val: tuple[str, ...] = option((), "Packs to validate on; the best weights have the least CD there.")
     initial: str = option("fast-wide", "Weights to start from: a file or the name of weights that ship.")
-    method: Literal["direct", "guided", "hybrid"] = option("direct", "Adaptation: direct, guided or hybrid.")
-    loss: str = option("", "Losses and weights, such as chamfer=1,soft_iou=3; by default those of the method.")
+    method: Literal["direct", "guided", "hybrid"] = option(
+        "direct", "Adaptation by losses of the scene (direct), neural (guided) or both (hybrid)."
+    )
+    loss: str = option(
+        "", "Losses and weights, such as chamfer=1,soft_iou=3; must be of the method, whose they are by default."
+    )
     executor: str = option("executor", "Weights of the neural executor, for the loss neural.")
     learn: Literal["all", "offsets"] = option("all", "all weights, or offsets alone, which is not the paper's way.")
     decoder: Decoder = option("select", "Decoder: argmax, novel or select; with an estimator in validation alone.")  # noqa: RUF009

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import pytest
 import torch
@@ -62,6 +63,16 @@ def test_a_users_function_is_a_loss_and_faulty_ones_are_refused(monkeypatch: pyt
     for name in ("chamfer", "reach", NEURAL, "a=b"):
         with pytest.raises(DeclarationError, match=r"declared twice|cannot be the name"):
             loss(name)
+
+
+def test_the_example_of_the_manual_costs_nothing_inside(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("shapeprog.liang2022.losses.LOSSES", dict(LOSSES))
+    manual = Path(losses.__file__).with_name("README.md").read_text(encoding="utf-8")
+    exec(manual.partition("```python\n")[2].partition("```")[0], {})
+    inside, outside = (comparison(CUBE, [[0, 0, 0], [7, 0, 0], [0, 0, end]]) for end in (8, 10))
+    assert inside.scene.distance(inside.points).tolist() == [[-8, -1, 0]]
+    assert float(compute(inside, {"huber": 1.0})["huber"]) == 0
+    assert float(compute(outside, {"huber": 1.0})["huber"]) == pytest.approx((0 + 0 + 1.5) / 3)
 
 
 @pytest.mark.parametrize(

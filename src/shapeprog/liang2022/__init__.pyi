@@ -1,3 +1,4 @@
+from . import losses, prior, renderer, settings
 from .adapt import AdaptTask, TargetStream, predicted_code
 from .decode import decode
 from .executor import NeuralExecutor
@@ -9,5 +10,6 @@ from .weights import build_generator, load_executor, load_generator, save_weight
 
 __all__ = [
     "AdaptSettings", "AdaptTask", "ExecutorSettings", "Generator", "NeuralExecutor", "PretrainSettings", "TargetStream",
-    "build_generator", "decode", "load_executor", "load_generator", "loss", "predicted_code", "save_weights", "train",
+    "build_generator", "decode", "load_executor", "load_generator", "loss", "losses", "predicted_code", "prior",
+    "renderer", "save_weights", "settings", "train",
 ]  # fmt: skip

@@ -8,6 +8,7 @@ are compiled before anything is timed; times to infer include reading the file.
 
 from __future__ import annotations
 
+import argparse
 import json
 import resource
 import subprocess
@@ -74,4 +75,5 @@ def main():
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     main()

@@ -8,6 +8,7 @@ The baseline, in the same run and on the same mesh, is trimesh's own voxeliser f
 
 from __future__ import annotations
 
+import argparse
 import json
 import time
 
@@ -126,4 +127,5 @@ def main():
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     main()

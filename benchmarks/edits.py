@@ -9,7 +9,7 @@ first in the text.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -89,4 +89,8 @@ def without_names(plain: Any, before: Any, value: float) -> tuple[str, Any]:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("picture", help="the file to write")
+    parser.add_argument("words", nargs="+", metavar="MESH CHANGE ...", help="meshes, each with the changes behind it")
+    args = parser.parse_args()
+    main(args.picture, *args.words)

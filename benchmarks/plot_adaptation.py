@@ -6,7 +6,7 @@ python -m benchmarks.plot_adaptation PACKS RESULTS docs
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -90,6 +90,10 @@ def plot_extrapolation(rows: Sequence[tuple[int, float, float]], out: Path) -> N
 
 
 if __name__ == "__main__":
-    packs, results, out = map(Path, sys.argv[1:])
-    plot_extrapolation(extrapolation(), out / "extrapolation.png")
-    plot_efficiency(packs, results, out / "adaptation_efficiency.png")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("packs", type=Path, help="folder of the packs")
+    parser.add_argument("results", type=Path, help="folder of the runs")
+    parser.add_argument("out", type=Path, help="folder for both plots")
+    args = parser.parse_args()
+    plot_extrapolation(extrapolation(), args.out / "extrapolation.png")
+    plot_efficiency(args.packs, args.results, args.out / "adaptation_efficiency.png")

@@ -7,8 +7,8 @@
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from collections import defaultdict
 from pathlib import Path
 
@@ -48,4 +48,8 @@ def main(rows_path: str, picture: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rows", help="rows of IoU, one line of JSON each")
+    parser.add_argument("picture", help="the file to write")
+    args = parser.parse_args()
+    main(args.rows, args.picture)

@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -82,4 +82,10 @@ def main(rows_path: str, picture: str, measure: str = "silhouette", over: str = 
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rows", help="rows of the measure, one line of JSON each")
+    parser.add_argument("picture", help="the file to write")
+    parser.add_argument("measure", nargs="?", default="silhouette", help="the measure to plot [%(default)s]")
+    parser.add_argument("over", nargs="?", default="allowed", help="allowed (blocks), or price [%(default)s]")
+    args = parser.parse_args()
+    main(args.rows, args.picture, args.measure, args.over)

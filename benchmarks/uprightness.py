@@ -9,7 +9,7 @@ DATA holds ``shapenet/{bench,cabinet}_train.npz``, ``modelnet40_voxels/*.npz``, 
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -108,4 +108,8 @@ def measure(data: Path) -> None:
 
 
 if __name__ == "__main__":
-    {"fit": fit, "measure": measure}[sys.argv[1]](Path(sys.argv[2]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("task", choices=("fit", "measure"))
+    parser.add_argument("data", type=Path, help="the folder described above")
+    args = parser.parse_args()
+    {"fit": fit, "measure": measure}[args.task](args.data)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import runpy
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +30,17 @@ for i in mirror(side):
 def compared(found: str) -> dict[str, float]:
     one, two = parse(TABLE), parse(found)
     return planted.solid_scores(one, sp.unroll(one), two, sp.unroll(two))
+
+
+SCRIPTS = sorted(path for path in Path(labels.__file__).parent.glob("*.py") if "__main__" in path.read_text())
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def test_every_benchmark_says_what_it_takes(path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setattr(sys, "argv", [path.name, "--help"])
+    with pytest.raises(SystemExit, match=r"^0$"):
+        runpy.run_path(str(path), run_name="__main__")
+    assert f"usage: {path.name}" in capsys.readouterr().out
 
 
 def test_a_planted_program_that_is_found_as_it_is_scores_in_full() -> None:

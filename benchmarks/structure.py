@@ -238,7 +238,7 @@ def run(args: argparse.Namespace) -> None:
 
 
 def table(path: Path) -> str:
-    """Markdown: the mean of every measure, with the floor in brackets where there is one."""
+    """Markdown: the mean of every measure, with that of the target itself in brackets where it is measured."""
     groups: dict[tuple[int, str, str, float], list[dict[str, Any]]] = {}
     for row in read_rows(path):
         groups.setdefault((row["allowed"], row["set"], row["method"], row["price"]), []).append(row)

@@ -334,7 +334,10 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
         assert found[kind]["f1"] > 0.95
     assert (found["programs"]["blocks"], found["meshes"]["blocks"]) == (2, 0)
     shown = run("evaluate", "programs", "targets")
-    assert "noise floor" in shown.out
+    assert "CD of the target itself" in shown.out
+    assert "F1@1% of the target itself" in shown.out
+    assert "floor" not in shown.out + run("evaluate", "programs", "targets", "--all").out
+    assert "two halves of its points" in run("evaluate", "--help").out
     assert "IoU@32" not in shown.out
     assert "IoU@32" in run("evaluate", "programs", "targets", "--all").out
 

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from shapeprog.language.program import Program
 
 _LABELS = {
-    "f1_percent": "F1@1%", "f1_percent_floor": "F1@1% floor", "silhouette": "silhouette", "one_piece": "one piece",
-    "part_recall": "part recall", "part_precision": "part precision", "cd": "CD", "noise_floor": "CD noise floor",
-    "numbers": "free numbers",
-    "f1_half_percent": "F1@.5%", "f1_half_percent_floor": "F1@.5% floor", "normals": "normals",
-    "normals_floor": "normals floor", "slivers": "slivers", "iou": "IoU@32", "f1": "F1@1cell",
+    "f1_percent": "F1@1%", "f1_percent_floor": "F1@1% of the target itself", "silhouette": "silhouette",
+    "one_piece": "one piece", "part_recall": "part recall", "part_precision": "part precision", "cd": "CD",
+    "noise_floor": "CD of the target itself", "numbers": "free numbers", "f1_half_percent": "F1@.5%",
+    "f1_half_percent_floor": "F1@.5% of the target itself", "normals": "normals",
+    "normals_floor": "normals of the target itself", "slivers": "slivers", "iou": "IoU@32", "f1": "F1@1cell",
     "blocks": "drawing statements", "statements": "statements", "primitives": "parts",
 }  # fmt: skip
 _MAIN = tuple(_LABELS)[:9]
@@ -150,7 +150,8 @@ def evaluate_command(
     part precision  primitives that cover one part
     IoU@32          of voxels, the numbers of the program rounded
     CD, F1@1cell    of 5,000 points; Chamfer distance with squared distances, both directions added, diagonal 1
-    floor           the same measure between two samplings of the target
+    ... of the      the same measure between two samplings of the target, or two halves of its points: about what
+    target itself   the best program reads. Halves have fewer points, so CD reads too high, F1 too low
 
     For --parts DIR, the folder DIR/Chair/bekvam holds the part meshes of the target Chair_bekvam. Parts, predicted
     meshes and predicted point clouds are in the coordinates of the target. A single prediction is compared with a

@@ -13,7 +13,8 @@ Likeness
     F1@.5 %, F1@1 %, normals and silhouette: see :mod:`shapeprog.evaluation.likeness`.  Normals and silhouette need a
     mesh as target; F1 needs points at least.
 Floors
-    CD and likeness between two independent samplings of the target itself.
+    CD and likeness between two independent samplings of the target itself, or two halves of its points: about what the
+    best program reads.  For F1 and normals that is a ceiling; halves have fewer points: CD reads too high, F1 too low.
 Structure
     Whether the union is one piece, slivers: see :mod:`shapeprog.evaluation.structure`; and continuous numbers, those
     that are free where others follow from names.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 import torch
@@ -110,6 +111,34 @@ def test_samples_of_the_core_and_of_the_reference_have_the_same_means_and_gradie
 @pytest.mark.parametrize("ids", [[0, 0, 0], [0, 1, 0], [1, 0, 2], [1, 2, 0], [19, 19, 19], [20, 1, 0], [19, 21, 1]])
 def test_blocks_outside_the_grammar_draw_nothing(ids):
     assert renderer.unroll(torch.tensor([ids]), torch.full((1, 3, 7), 2.0)) == []
+
+
+def test_of_all_blocks_the_core_draws_those_of_the_reference_and_further_rotations():
+    """Published are [k], [19, k], [19, 19, k], [20, 10] and [20, 17]; the core draws any loops around a statement."""
+    ids = torch.cartesian_prod(*[torch.arange(22)] * 3)
+    parameters = torch.full((*ids.shape, 7), 2.0, dtype=torch.float64)
+    parameters[..., 1:3] = torch.rand(*ids.shape, 2, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    heights = 100.0 * torch.arange(len(ids), dtype=torch.float64)[:, None]  # tell the blocks of the reference apart
+    parameters[..., 0] = torch.where(ids < TRANSLATE, heights, 2.0)
+    parameters[..., 3] = torch.where(ids == LINE, heights, 2.0)
+    scene, centres = (
+        unroll(Code(ids, parameters)),
+        torch.stack([each.centre for each in renderer.unroll(ids, parameters)]),
+    )
+
+    letters = ["d"] * 22  # a statement, of which two rotate as published; loops; padding or an end
+    letters[10] = letters[17] = "p"
+    letters[0], letters[19], letters[20], letters[21] = "eTRe"
+    words = ["".join(letters[number] for number in row) for row in ids.tolist()]
+    copies = torch.tensor([2 ** sum(letter in "TR" for letter in word) for word in words])
+    drawn = torch.tensor([re.fullmatch("[TR]*[pd]e*", word) is not None for word in words])
+    published = torch.tensor([re.fullmatch("(T*[pd]|Rp)e*", word) is not None for word in words])
+    of_core, of_reference = scene.block, (centres[:, 0] / 100).long()
+    assert torch.equal(of_core.bincount(minlength=len(ids)), copies * drawn)
+    assert torch.equal(of_reference.bincount(minlength=len(ids)), copies * published)
+    torch.testing.assert_close(scene.centre[published[of_core]], centres)
+    further = {word.strip("e").replace("p", "d") for word, more in zip(words, drawn & ~published, strict=True) if more}
+    assert (int((drawn & ~published).sum()), further) == (86, {"Rd", "TRd", "RTd", "RRd"})
 
 
 def test_loops_without_copies_and_negative_extents_draw_nothing():

@@ -49,7 +49,9 @@ def unroll(ids: Int[Tensor, "K J"], parameters: Float[Tensor, "K J 7"]) -> list[
 
     Translation: copy i is shifted by i (rho_2, rho_3, rho_4); rho_1 is the count, which the paper leaves out.
     Rotation: copy i of n is turned by i/n of a circle about the vertical axis through its start, a cross arm by quarter
-    turns.  Counts and quarter turns are rounded; blocks outside the grammar and negative extents draw nothing.
+    turns.  Counts and quarter turns are rounded; negative extents draw nothing, nor do blocks outside the published
+    grammar.  Of these, the language of this package draws rotations of other statements, and those inside or around
+    another loop.
     """
     primitives: list[Primitive] = []
     for block, rows in zip(ids.tolist(), parameters, strict=True):

@@ -95,10 +95,11 @@ def test_values_that_no_program_can_have_are_refused_but_where_a_gradient_is_rec
         CHAIR.at(recorded)
 
 
-def test_a_negative_length_that_is_recorded_is_drawn_and_grows() -> None:
+def test_a_negative_length_that_is_recorded_draws_nothing_or_the_shortest() -> None:
     values = CHAIR.values.clone()
     values[CHAIR.names.index("seat_bottom")] = -1.0
-    scene = sp.unroll(CHAIR.at(values.requires_grad_()))
+    assert sp.unroll(CHAIR.at(values.requires_grad_())).mask.sum() == 1
+    scene = sp.unroll(CHAIR.at(values), shortest=0.2)
     assert scene.mask.all()
     assert float(scene.size[:, :3].detach().min()) == pytest.approx(0.1)
 

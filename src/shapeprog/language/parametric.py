@@ -77,8 +77,8 @@ class Parametric:
         ------
         ShapeProgError
             If these are no values, as many as there are names, in float32 or float64; and, where no gradient is
-            recorded, if they make a length negative or a number not finite.  Where one is, unrolling leads short
-            lengths back above zero, see :func:`~shapeprog.language.unroll.unroll`.
+            recorded, if they make a length negative or a number not finite.  Where one is, steps may pass through such
+            values: a negative length draws nothing, unless ``unroll`` is given the ``shortest``.
         """
         check_tensor("values", values, len(self.names))
         if self.matrix is not None and self.offset is not None:

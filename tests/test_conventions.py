@@ -223,7 +223,7 @@ def test_the_modules_of_the_paper_that_pages_name_are_found_without_an_import() 
     code = (
         "from shapeprog import liang2022 as p\nprint(p.renderer.SKIN, p.losses.DECAY, p.prior.BLOCKS, p.settings.LOG)"
     )
-    assert run_python(code) == "17 0.9 10 log.jsonl"
+    assert run_python(code) == "0.0001 0.9 10 log.jsonl"
     code = "import shapeprog.liang2022.decode, shapeprog as sp; print(callable(sp.liang2022.decode))"
     assert run_python(code) == "True"
 

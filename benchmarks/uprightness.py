@@ -18,9 +18,9 @@ from scipy.optimize import minimize
 
 from shapeprog.data.packs import read_pack
 from shapeprog.data.parts import part_files, read_parts
-from shapeprog.data.uprightness import WEIGHTS, find_up, measures, name_of
+from shapeprog.data.uprightness import WEIGHTS, find_up, measures
 from shapeprog.data.voxelise import voxelise_mesh
-from shapeprog.space import Array, Frame
+from shapeprog.space import Array, Frame, axis_name
 
 LARGEST = {"bench": 200, "cabinet": 200}
 """Most training shapes of the two large categories; of every other one 80."""
@@ -93,7 +93,7 @@ def measure(data: Path) -> None:
             turn = turn * [1, -1, -1]  # half a turn about x: upside down
         placed = vertices @ turn.T
         cells = voxelise_mesh(Frame.around(placed.min(0), placed.max(0)).to_grid(placed), faces)
-        true = name_of(turn @ np.array([0.0, 1.0, 0.0]))
+        true = axis_name(turn @ np.array([0.0, 1.0, 0.0]))
         alone, hinted = find_up(cells), find_up(cells, usual=true)
         misled = find_up(cells, usual="+y")
         rows.setdefault(name, []).append(

@@ -21,6 +21,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from shapeprog.arguments import check_number
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import surface_kernels as kernels
 from shapeprog.geometry.arrays import cast, first_order, gradients, numbers, over_threads, table_of
@@ -88,6 +89,9 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
     ShapeProgError
         If an element has no surface, or one that is too large or too far away for single precision.
     """
+    check_number("n", n, 0, whole=True)
+    if not isinstance(generator, torch.Generator | None):
+        raise ShapeProgError(f"generator is {generator!r}", "give torch.Generator().manual_seed(0), for example")
     flat = batch.flatten()
     areas = face_areas(flat)
     shares = area_shares(areas.detach(), batch)

@@ -68,7 +68,7 @@ class Prices:
     loop: float = 0.002
     number: float = 0.0005
     part: float = 0.002
-    close: float = 0.02
+    close: float = 0.015
 
     def of(self, program: Program) -> float:
         """The price of the text of a program; function definitions cost nothing."""

@@ -17,7 +17,7 @@ import numpy as np
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
-from shapeprog.inference.candidates.neighbours import neighbours, residual_candidates, shorter
+from shapeprog.inference.candidates.neighbours import neighbours, recounted, residual_candidates, shorter
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
@@ -131,16 +131,18 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     """The adjusted program; blocks whose adjustment costs more than .005 of the target are restored.
 
     A block loses a loop, or nested loops become one row, where the text becomes cheaper and that costs less than .001,
-    the error of the coverage.
+    the error of the coverage; and a row loses a copy that costs nothing, such as a shelf inside the top.
     """
-    restored = [(index, node, 0.005) for index, node in enumerate(start.body)]
-    shortened = [(index, node, -0.001) for index, block in enumerate(adjusted.body) for node in shorter(block)]
-    options = [*restored, *shortened]
+    options = [(index, node, 0.005) for index, node in enumerate(start.body)]
+    for index, block in enumerate(adjusted.body):
+        options += [(index, node, -0.001) for node in shorter(block)]
+        options += [(index, node, -0.00001) for node in recounted(block, -1)]
     nodes = [*adjusted.body, *(node for _, node, _ in options)]
-    table, selected = _table(nodes, coverage), tuple(range(len(restored)))
+    table, selected = _table(nodes, coverage), tuple(range(len(start.body)))
+    text = [(price, Program((node,)).size) for price, node in zip(table.prices, nodes, strict=True)]
     for option, (index, _, least) in enumerate(options, len(selected)):
         trial = (*selected[:index], option, *selected[index + 1 :])
-        cheaper = table.prices[option] < table.prices[selected[index]]
+        cheaper = text[option] < text[selected[index]]
         if (least > 0 or cheaper) and value(table, trial) > value(table, selected) + least:
             selected = trial
     return Program(tuple(nodes[option] for option in selected))

@@ -48,7 +48,7 @@ def neighbours(program: Program) -> list[Node]:
             edited = list(met(box, parts))
             edited += [middle for candidate in [box, *edited] for middle in centred(candidate)]
             result += [node for candidate in edited for node in redrawn(chain, candidate)]
-            result += [*_recounted(chain, box), *_filled(chain)]
+            result += [*recounted(nest(chain), -1), *recounted(nest(chain), 1), *_filled(chain)]
     for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
         if box is not None and other_box is not None and _loops(chain) == _loops(other):
             merged = (drawing for around in _merged(box, other_box) for drawing in drawings(around))
@@ -90,14 +90,16 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
                 yield nest((mirror(axis), *chain[1:]))
 
 
-def _recounted(chain: Chain, box: Box) -> Iterator[Node]:
-    """A run with one copy more or one less, at its end or at its beginning."""
-    for (index, loop), more in itertools.product(enumerate(chain[:-1]), (-1, 1)):
-        if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2:
+def recounted(node: Node, more: int) -> Iterator[Node]:
+    """A run with so many copies more, at its end or at its beginning."""
+    (chain,) = Program((node,)).chains
+    boxes = solid_boxes([chain[-1]])[0]
+    for index, loop in enumerate(chain[:-1]):
+        if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2 and len(boxes) == 1:
             count, step = float(loop.count + more), loop.values[1:]
             outer, inner = (*chain[:index], replace(loop, values=(count, *step))), chain[index + 1 :]
             yield nest((*outer, *inner))
-            moved = box._replace(centre=box.centre - more * np.array(step))
+            moved = boxes[0]._replace(centre=boxes[0].centre - more * np.array(step))
             for drawing in hinted(language()[chain[-1].name], moved):
                 yield nest((*outer, *inner[:-1], drawing))
 

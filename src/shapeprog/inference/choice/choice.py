@@ -1,6 +1,6 @@
 """Selection of a few candidates that explain as much of the target as possible with as little text as possible.
 
-    value = share explained + .015 share near + parts drawn - unsupported surface - free space filled - price of the text
+    value = explained + .015 near + parts drawn - unsupported surface - free space filled - price of the text
 
 all in shares of the target, see :class:`~shapeprog.inference.choice.coverage.Prices`.  A candidate that explains only
 points of others gains nothing and costs its price.  Surface inside another selected candidate costs nothing and

@@ -17,7 +17,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats.parts import parts, solid
 from shapeprog.geometry.batch import Solids
-from shapeprog.inference.assembly import Assembly, assemble
+from shapeprog.inference.assembly import Assembly, _unharmed, assemble
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import distinct, images, profiles, repeated
 from shapeprog.inference.choice.coverage import Coverage
@@ -254,6 +254,15 @@ def test_a_thick_seat_with_bevelled_edges_is_a_cushion():
     seat = next(node for node in found.walk() if isinstance(node, Draw) and node.values[4] > 20)
     assert seat.name == "cushion"
     assert seat.values == pytest.approx([1.6, -12, -12, 6.4, 24, 24, 1.7], abs=0.3)
+
+
+def test_a_row_ends_before_the_board_that_its_last_copy_would_lie_in():
+    top = "locker(at=(11, -4, -12), size=(1, 8, 24))\n"
+    shelves = "for i in translate(4, by=(7.7, 0, 0)):\n    box(at=(-12, -3.5, -11.5), size=(0.8, 7, 23))\n"
+    program = parse(top + shelves)
+    found = _unharmed(program, program, Coverage(evidence_of(whole(top + shelves))))
+    assert [node.count for node in found.body if isinstance(node, Loop)] == [3]
+    assert found.body[0] == program.body[0]
 
 
 def test_the_same_seed_gives_the_same_program():

@@ -111,6 +111,18 @@ def test_what_another_buries_explains_nothing():
     assert choose(made, 3) == (0,)
 
 
+def test_of_two_that_explain_the_same_the_one_nearer_to_the_surface_is_chosen():
+    post, round_post = (
+        parse("box(at=(-12, -0.4, -0.4), size=(24, 0.8, 0.8))"),
+        parse("cylinder(at=(-12, 0, 0), height=24, radius=0.43)"),  # a number less
+    )
+    vertices, faces = union_mesh(unroll(post))
+    made = Coverage(evidence_of(shape_from_mesh(vertices, faces))).table([round_post, post])
+    assert explained(made, (0,)) == pytest.approx(explained(made, (1,)), abs=0.01)
+    assert made.prices[0] < made.prices[1]
+    assert choose(made, 1) == (1,)
+
+
 @pytest.mark.parametrize(
     ("block", "known"),
     [

@@ -111,16 +111,17 @@ def test_what_another_buries_explains_nothing():
     assert choose(made, 3) == (0,)
 
 
-def test_of_two_that_explain_the_same_the_one_nearer_to_the_surface_is_chosen():
-    post, round_post = (
-        parse("box(at=(-12, -0.4, -0.4), size=(24, 0.8, 0.8))"),
-        parse("cylinder(at=(-12, 0, 0), height=24, radius=0.43)"),  # a number less
+def test_a_round_post_is_less_near_to_a_square_one():
+    square, rounded = (
+        parse("box(at=(-12, -0.6, -0.6), size=(24, 1.2, 1.2))"),
+        parse("cylinder(at=(-12, 0, 0), height=24, radius=0.7)"),
     )
-    vertices, faces = union_mesh(unroll(post))
-    made = Coverage(evidence_of(shape_from_mesh(vertices, faces))).table([round_post, post])
-    assert explained(made, (0,)) == pytest.approx(explained(made, (1,)), abs=0.01)
-    assert made.prices[0] < made.prices[1]
-    assert choose(made, 1) == (1,)
+    evidence = evidence_of(shape_from_mesh(*union_mesh(unroll(square))))
+    near, plain = (Coverage(evidence, prices).table([square, rounded]) for prices in (Prices(), Prices(close=0)))
+    assert explained(near, (1,)) == pytest.approx(explained(near, (0,)), abs=0.01)
+    gains = [value(near, (k,)) - value(plain, (k,)) for k in range(2)]
+    assert gains[0] == pytest.approx(Prices.close, rel=0.02)
+    assert gains[1] < 0.75 * Prices.close
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.elements import Slot
 from shapeprog.inference.ties.expressions import solved
-from shapeprog.inference.ties.groups import grouped
+from shapeprog.inference.ties.groups import grouped, simplified
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.misfit import Misfit, closeness
 from shapeprog.inference.ties.relations import Relation, worthwhile
@@ -748,6 +748,12 @@ def test_the_second_point_of_a_part_does_not_give_its_bottom():
     assert named(lines, {"a": 2, "b": 3}, known) == {"a": "leg_inset", "b": "leg_end_bottom"}
     lines = parsed(rod.format(side="left") + "shelf(bottom=b, height=1)\nseat(top=9, height=a)\n")
     assert named(lines, {"b": 3}, known) == {"b": "shelf_bottom"}
+
+
+def test_a_taper_with_equal_radii_is_a_rod():
+    text = "leg({kind}(start=at(left=2, rear=1), end=at(left=5, rear=4, bottom=9), radius={radius}))\n"
+    (line,) = parsed(text.format(kind="taper", radius="(a, a)"))
+    assert [simplified(line, WHOLE | {"a": 1})] == [*parsed(text.format(kind="rod", radius="a"))]
 
 
 def test_no_name_is_used_once():

@@ -23,11 +23,15 @@ from shapeprog.space import FloatArray
 
 def simplified(line: Line, numbers: dict[str, float]) -> Line:
     """The line without keywords of zero, and of points, that change nothing that it draws, given the values of all
-    names."""
+    names; a taper with equal radii is a rod."""
     if isinstance(line, Part) or (isinstance(line, Group) and line.kind in ("divide", "row")):
         for keywords in _shorter(line.keywords):
             if _same(line, shorter := replace(line, keywords=keywords), numbers):
                 return simplified(shorter, numbers)
+        radius = dict(line.keywords).get("radius")
+        if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
+            keywords = tuple((word, radius[0] if word == "radius" else value) for word, value in line.keywords)
+            return replace(line, kind="rod", keywords=keywords)
     return line
 
 

@@ -19,8 +19,8 @@ from torch import Tensor
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import touching
-from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, Key
-from shapeprog.inference.ties.layout import Layout, boxes_of
+from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, Key, boxes_of
+from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.placement import AXES
 from shapeprog.space import Array, FloatArray

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from shapeprog.geometry.scene import Scene
+from shapeprog.geometry.separation import OrientedBoxes
 from shapeprog.language.ast import Group, Keywords, Part, Point
 from shapeprog.language.expression import value_at
 from shapeprog.language.placement import AXES, POINTS, SIZES, coordinate_of, interval_of
@@ -122,3 +124,9 @@ def ends_of(
     start = ends_of(line, "start", axis, numbers, forms)[0] if key in ("through", "end") else None
     coordinate = coordinate_of(axis, given, *sides, start)
     return coordinate, coordinate
+
+
+def boxes_of(scene: Scene) -> OrientedBoxes:
+    """The boxes around the primitives of a scene (N,), for a person in front: to the right, to the rear, upwards."""
+    edges = scene.rotation.transpose(1, 2) * scene.bounds[..., None]
+    return OrientedBoxes(*(vectors.numpy()[..., ::-1] * [-1, 1, 1] for vectors in (scene.centre, edges)))

@@ -18,8 +18,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shapeprog.geometry.separation import gaps, touching
-from shapeprog.inference.ties.elements import Slot
-from shapeprog.inference.ties.layout import Layout, boxes_of
+from shapeprog.inference.ties.elements import Slot, boxes_of
+from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.library.independence import independent
 from shapeprog.space import Array, FloatArray

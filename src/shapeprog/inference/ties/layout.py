@@ -10,7 +10,6 @@ import torch
 from torch import Tensor
 
 from shapeprog.geometry.scene import Scene
-from shapeprog.geometry.separation import OrientedBoxes
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.ties.elements import (
     ALIGNED,
@@ -318,9 +317,3 @@ class Layout:
         self.names.append(f"n{len(self.slots)}")
         self.slots.append(Slot(line, word, kind, axis, value))
         return Name(self.names[-1])
-
-
-def boxes_of(scene: Scene) -> OrientedBoxes:
-    """The boxes around the primitives of a scene (N,), for a person in front: to the right, to the rear, upwards."""
-    edges = scene.rotation.transpose(1, 2) * scene.bounds[..., None]
-    return OrientedBoxes(*(vectors.numpy()[..., ::-1] * [-1, 1, 1] for vectors in (scene.centre, edges)))

@@ -756,6 +756,13 @@ def test_a_taper_with_equal_radii_is_a_rod():
     assert [simplified(line, WHOLE | {"a": 1})] == [*parsed(text.format(kind="rod", radius="a"))]
 
 
+def test_a_named_distance_that_happens_to_be_zero_is_kept():
+    (line,) = parsed(
+        "leg(rod(start=at(left=2, x=0), end=at(x=a, rear=4, bottom=9), radius=1))\n".replace("left=2, ", "")
+    )
+    assert simplified(line, WHOLE | {"a": 0.0}).keywords == line.keywords
+
+
 def test_no_name_is_used_once():
     for text in (TABLE, CABINET):
         source = source_of(sp.parse(tied_text(text)))

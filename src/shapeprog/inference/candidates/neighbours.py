@@ -93,15 +93,15 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
 def recounted(node: Node, more: int) -> Iterator[Node]:
     """A run with so many copies more, at its end or at its beginning."""
     (chain,) = Program((node,)).chains
-    boxes = solid_boxes([chain[-1]])[0]
     for index, loop in enumerate(chain[:-1]):
-        if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2 and len(boxes) == 1:
+        if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2:
             count, step = float(loop.count + more), loop.values[1:]
             outer, inner = (*chain[:index], replace(loop, values=(count, *step))), chain[index + 1 :]
             yield nest((*outer, *inner))
-            moved = boxes[0]._replace(centre=boxes[0].centre - more * np.array(step))
-            for drawing in hinted(language()[chain[-1].name], moved):
-                yield nest((*outer, *inner[:-1], drawing))
+            for box in solid_boxes([chain[-1]])[0][:1]:
+                moved = box._replace(centre=box.centre - more * np.array(step))
+                for drawing in hinted(language()[chain[-1].name], moved):
+                    yield nest((*outer, *inner[:-1], drawing))
 
 
 def _filled(chain: Chain) -> Iterator[Node]:

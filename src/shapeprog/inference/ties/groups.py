@@ -112,7 +112,7 @@ def _words(line: Line) -> int:
 def _same(line: Line, other: Line, numbers: dict[str, float]) -> bool:
     """Whether two lines draw the same statements whatever the numbers are: tried with irregular ones."""
     random = np.random.default_rng(0)
-    changed = {name: value * random.uniform(0.9, 1.1) for name, value in numbers.items()}
+    changed = {name: (value or 0.1) * random.uniform(0.9, 1.1) for name, value in numbers.items()}
     drawn: list[FloatArray] = []  # the values of all statements in cells
     for each in (line, other):
         source = placed_source((Assignment(tuple(numbers.items())), each))

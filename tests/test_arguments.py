@@ -54,8 +54,14 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
         (lambda: sp.unroll("leg()"), r"'leg\(\)' is no program, and no list of programs\n.* with parse"),
         (lambda: sp.unroll(None), "None is no program"),
         (lambda: sp.unroll([CODE]), "is no program"),
+        (lambda: sp.unroll(PROGRAM, shortest="x"), "shortest is 'x'\n  hint: give a number of 0 or more"),
+        (lambda: sp.unroll(PROGRAM, shortest=np.ones(2)), "shortest is array"),
+        (lambda: sp.unroll(PROGRAM, shortest=-0.1), "shortest is -0.1"),
         (lambda: sp.set(PROGRAM, seat_bottom="47"), "seat_bottom = '47' is no number"),
         (lambda: sp.set(PROGRAM, seat_bottom=None), "seat_bottom = None is no number"),
+        (lambda: sp.set(PROGRAM, seat_bottom=np.array([1.0, 2.0])), r"seat_bottom = array\(\[1., 2.\]\) is no number"),
+        (lambda: sp.set(PROGRAM, seat_bottom=True), "seat_bottom = True is no number"),
+        (lambda: sp.set(PROGRAM, seat_bottom=10**400), "seat_bottom = 10{400} is no number, not finite, or too large"),
         (lambda: CHAIR.at(torch.ones(3)), r"values has the shape \(3,\)\n.* x 4$"),
         (lambda: CHAIR.at(torch.tensor(1.0)), r"values has the shape \(\)"),
         (lambda: CHAIR.at(torch.ones(4).long()), r"values holds torch.int64"),
@@ -84,6 +90,33 @@ def test_right_arguments_pass() -> None:
     assert sp.set(PROGRAM, seat_bottom=torch.tensor(40.0)) == sp.set(PROGRAM, seat_bottom=np.int64(40))  # type: ignore[arg-type]
     check_number("a share", np.float32(1), 0, 1)
     check_number("a count", np.int64(3), 1, whole=True)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize(
+    "value",
+    [10**400, np.array([1, 2]), torch.ones(2), True, np.True_, "1", b"1", None, 1j, torch.ones(1, device="meta")],
+)
+def test_what_is_no_number_is_refused(value: Any, whole: bool) -> None:
+    with pytest.raises(sp.ShapeProgError, match=r"n is .*\n  hint: give a .*number of 0 or more"):
+        check_number("n", value, 0, whole=whole)
+
+
+def test_a_fraction_is_no_whole_number() -> None:
+    check_number("n", torch.tensor(1.5), 0)
+    check_number("n", torch.tensor(2), 0, whole=True)
+    for value in (torch.tensor(1.5), np.float64(2)):
+        with pytest.raises(sp.ShapeProgError, match="give a whole number"):
+            check_number("n", value, 0, whole=True)
+
+
+def test_lack_of_memory_is_no_wrong_shape(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: Any) -> None:
+        raise RuntimeError("not enough memory")
+
+    monkeypatch.setattr(type(SCENES), "flatten", full)
+    with pytest.raises(RuntimeError, match="not enough memory"):
+        SCENES.distance(POINTS)
 
 
 @pytest.mark.parametrize("factor", [-1.0, torch.nan, torch.inf])

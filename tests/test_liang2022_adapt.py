@@ -260,13 +260,23 @@ def test_what_cannot_be_adapted_is_an_error_before_it_begins(room: Path, tmp_pat
         ({"learning_rate": float("nan")}, "learning_rate is nan\n  hint: give a number of 0 or more"),
         ({"kl": -1}, "kl is -1"),
         ({"beta1": 1.5}, "beta1 is 1.5\n  hint: give a number of 0 or more, at most 1"),
-        ({"train": "few.npz"}, "train is 'few.npz'\n  hint: give a tuple"),
+        ({"beta1": 1}, "beta1 is 1\n  hint: give a number of 0 or more, below 1"),
+        ({"train": "few.npz"}, "train is 'few.npz'\n  hint: give a tuple of texts"),
+        ({"train": Path("few.npz")}, "hint: give a tuple of texts"),
+        ({"train": ("few.npz", 5)}, r"train is \('few.npz', 5\)\n  hint: give a tuple of texts"),
+        ({"initial": ("fast-wide",)}, "hint: give a text"),
         ({"initial": 5}, "initial is 5"),
     ],
 )
 def test_settings_check_themselves(options: dict[str, Any], message: str):
     with pytest.raises(ShapeProgError, match=message):
         AdaptSettings(**{"train": ("few.npz",), **options})
+
+
+@pytest.mark.wrong_types
+def test_settings_keep_paths_as_texts_and_lists_as_tuples():
+    given: dict[str, Any] = {"train": [Path("few.npz"), "a"], "initial": Path("b"), "executor": Path("c")}
+    assert AdaptSettings(**given) == AdaptSettings(train=("few.npz", "a"), initial="b", executor="c")
 
 
 def test_a_stream_of_nothing_is_refused(room: Path):

@@ -15,6 +15,7 @@ import torch
 from liang2022_toys import TOY, Toy, run, same
 
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.liang2022 import loop
 from shapeprog.liang2022.loop import BEST, LOG, STATE, WEIGHTS, read_log, train
 from shapeprog.liang2022.settings import TrainingSettings
 from shapeprog.liang2022.weights import read_card
@@ -135,6 +136,30 @@ def test_the_error_of_a_run_that_diverges_says_what_its_folder_holds(tmp_path: P
     assert (begun["step"], begun["optimiser"]["state"]) == (0, {})  # type: ignore[index]
     assert same(begun["module"], Toy().module.state_dict())
     assert len(list(train(Toy(), TOY, tmp_path, device="cpu", restart=True))) == 20
+
+
+def test_only_the_process_that_saves_says_what_the_folder_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(loop, "_processes", lambda _: (1, 2, torch.device("cpu")))
+    monkeypatch.setattr(loop, "_average", lambda _: None)
+    with pytest.raises(ShapeProgError, match=r"the loss of step [2-9] is .*\n.*a lower learning rate$"):
+        run(tmp_path, settings=replace(TOY, learning_rate=1e18, warm_up=0, clip_norm=0.0))
+
+
+@pytest.mark.parametrize("part", ["batch", "losses"])
+def test_a_restart_that_fails_before_its_first_loss_leaves_the_run_as_it_was(
+    part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def full(*_: object) -> None:
+        raise RuntimeError("out of memory")
+
+    run(tmp_path, stop_at=5)
+    kept = {name: (tmp_path / name).read_bytes() for name in (STATE, LOG)}
+    task = Toy()
+    monkeypatch.setattr(task, part, full)
+    with pytest.raises(RuntimeError, match="out of memory"):
+        list(train(task, TOY, tmp_path, device="cpu", restart=True))
+    assert kept == {name: (tmp_path / name).read_bytes() for name in (STATE, LOG)}
+    assert run(tmp_path)[1][0]["step"] == 7
 
 
 def test_a_run_that_is_killed_before_its_first_step_begins_again_as_it_was(tmp_path: Path):

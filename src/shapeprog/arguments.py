@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import math
+import operator
 from typing import Any
 
+import numpy as np
+
 from shapeprog.errors import ShapeProgError
+
+
+def number_of(value: Any, *, whole: bool = False) -> float:
+    """A value as a number, not a number (NaN) if it is none; booleans and text are none."""
+    if isinstance(value, (bool, np.bool_, str, bytes, bytearray)):
+        return math.nan
+    try:
+        return float(operator.index(value)) if whole else float(value)
+    except (TypeError, ValueError, OverflowError, RuntimeError):
+        return math.nan
 
 
 def check_number(
     name: str, value: Any, least: float, most: float = math.inf, *, whole: bool = False, above: bool = False
 ) -> None:
     """Raise a ``ShapeProgError`` unless a value is a finite number from ``least``, or ``above`` it, to ``most``."""
-    number = float(value) if hasattr(value, "__index__" if whole else "__float__") else math.nan
+    number = number_of(value, whole=whole)
     if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
         bounds = f"above {least:g}" if above else f"of {least:g} or more"
         bounds += f", at most {most:g}" if most < math.inf else ""

@@ -111,13 +111,13 @@ class _UnionDistance(torch.autograd.Function):
 def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"]]:
     """Batch and points with one batch dimension."""
     check_tensor("points", points, "P", 3)
-    shape, lead = points.shape[-2:], tuple(batch.batch_shape)
-    try:
-        return batch.flatten(), points.expand(*lead, *shape).reshape(-1, *shape)
-    except RuntimeError:
+    given, shape, lead = points.shape[:-2], points.shape[-2:], tuple(batch.batch_shape)
+    right = (one in (1, other) for one, other in zip(given[::-1], lead[::-1], strict=False))
+    if len(given) > len(lead) or not all(right):
         cause = f"points of the shape {tuple(points.shape)} do not go with scenes of the shape {lead}"
         wanted = f"({', '.join(map(str, (*lead, 'P', 3)))}) or (P, 3)" if lead else "(P, 3), or unroll a list"
-        raise ShapeProgError(cause, f"give the shape {wanted}") from None
+        raise ShapeProgError(cause, f"give the shape {wanted}")
+    return batch.flatten(), points.expand(*lead, *shape).reshape(-1, *shape)
 
 
 def _nearest(table: Array, points: Float[Tensor, "B P 3"]) -> Nearest:

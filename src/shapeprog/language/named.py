@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
+from shapeprog.arguments import number_of
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.geometry.contacts import contact_groups
 from shapeprog.language.ast import Assignment, Fault, Line, Source
@@ -100,7 +101,7 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
             hint = did_you_mean(name, declared) if declared else "it has no names: write name = number at its top"
             raise ShapeProgError(f"this program has no name {name!r}", hint)
         number = replacements[name]
-        if not hasattr(number, "__float__") or not abs(number) <= LARGEST:  # true of NaN, too
+        if not abs(number_of(number)) <= LARGEST:  # true of NaN, too
             message = f"{name} = {number!r} is no number, not finite, or too large for single precision"
             raise ShapeProgError(message, "write one such as 12.5")
     try:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from jaxtyping import Bool, Float, Int
 
+from shapeprog.arguments import check_number
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
@@ -46,8 +47,11 @@ def unroll(program: Program | Sequence[Program] | Code, *, shortest: float = 0.0
     Raises
     ------
     ShapeProgError
-        If a program makes more than ``MOST_COPIES`` copies, or the batch more than ``MOST_PRIMITIVES``.
+        If a program makes more than ``MOST_COPIES`` copies, or the batch more than ``MOST_PRIMITIVES``, or ``shortest``
+        is no number of 0 or more.
     """
+    if type(shortest) is not float or shortest:
+        check_number("shortest", shortest, 0)
     code = program if isinstance(program, Code) else encode(program)
     recorded = torch.is_grad_enabled() and code.parameters.requires_grad
     return Plan(code).scene(code.parameters, shortest=shortest * recorded)

@@ -68,12 +68,12 @@ def train(
 ) -> Iterator[Record]:  # fmt: skip
     """Train, yielding one record per step.
 
-    The folder gets ``state.pt`` (weights, optimiser, step, settings) before the first step, every two minutes and at
-    the end, ``log.jsonl``, and after each validation ``weights.safetensors``, and ``best.safetensors`` where the score
-    is the best so far.  A run in it is resumed, or with ``restart`` overwritten.  The device is ``auto``, ``cpu`` or
-    ``cuda``.  Once ``stop`` is set, the state is saved after the current step and training ends.  The card of the
-    weights holds ``command``.  Raises a ``ShapeProgError`` if the saved run has other settings, another process trains
-    there, the loss is not finite, or a file cannot be written; the last state stays.
+    The folder gets ``state.pt`` (weights, optimiser, step, settings) as it was before the first step, every two minutes
+    and at the end, ``log.jsonl``, and after each validation ``weights.safetensors``, and ``best.safetensors`` where the
+    score is the best so far.  A run in it is resumed, or with ``restart`` overwritten after the first loss.  The device
+    is ``auto``, ``cpu`` or ``cuda``.  Once ``stop`` is set, the state is saved after the current step and
+    training ends.  The card of the weights holds ``command``.  Raises a ``ShapeProgError`` if the saved run has other
+    settings, another process trains there, the loss is not finite, or a file cannot be written; the last state stays.
     """
     rank, world, where = _processes(device)
     module = task.module.to(where).to(memory_format=torch.channels_last_3d).train()  # type: ignore[call-overload]
@@ -87,18 +87,18 @@ def train(
             raise ShapeProgError(f"another process trains in {folder}", "wait for it, or choose another folder")
         if (folder / STATE).exists() and not restart:
             step, best = _resume(folder / STATE, settings, module, optimiser)
-        if rank == 0:
-            records = [record for record in read_log(folder / LOG) if record["step"] <= step] if step else []
+        if rank == 0 and step:
+            records = [record for record in read_log(folder / LOG) if record["step"] <= step]
             write_text(folder / LOG, "".join(f"{json.dumps(record)}\n" for record in records))
 
-        def save_state() -> tuple[int, float]:
+        def state_now() -> bytes:
             state: dict[str, Any] = {"settings": asdict(settings), "step": step, "best": best}
             state |= {"module": module.state_dict(), "optimiser": optimiser.state_dict()}
             torch.save(state, content := io.BytesIO())
-            write_bytes(folder / STATE, content.getvalue())
-            return step, time.monotonic()
+            return content.getvalue()
 
-        saved, saved_at = save_state() if rank == 0 and not step else (step, time.monotonic())
+        begun = state_now() if rank == 0 and not step else b""  # written after the first loss, which may fail
+        saved, saved_at = step, time.monotonic()
         clock = time.monotonic()
         for batch in _prefetch(task.batch, range(step * world + rank, steps * world, world)):
             for group in optimiser.param_groups:
@@ -118,10 +118,14 @@ def train(
                 _average([*(weight.grad for weight in weights if weight.grad is not None), *buffers, values])
             norm = float(torch.nn.utils.clip_grad_norm_(weights, settings.clip_norm or math.inf))
             total, stopped, *parts = values.tolist()
+            if begun:
+                write_bytes(folder / STATE, begun)
+                write_text(folder / LOG, "")
+                begun = b""
             if not math.isfinite(total + norm):
                 cause = f"the loss of step {step + 1} is {total}, the norm of its gradient {norm}"
-                cure = f"start over with --restart and a lower learning rate; {folder} holds the state of step {saved}"
-                raise ShapeProgError(cause, cure)
+                cure = "start over with --restart and a lower learning rate"
+                raise ShapeProgError(cause, f"{cure}; {folder} holds the state of step {saved}" if rank == 0 else cure)
             optimiser.step()
             step += 1
             record = {"step": step, "samples_seen": step * together, "loss": total, "gradient_norm": norm}
@@ -142,7 +146,8 @@ def train(
                     best = max(best, scores.get("score", -math.inf))
                 append_line(folder / LOG, json.dumps({k: v for k, v in record.items() if math.isfinite(v)}))
                 if last or stopped or time.monotonic() - saved_at >= SAVE_SECONDS:
-                    saved, saved_at = save_state()
+                    write_bytes(folder / STATE, state_now())
+                    saved, saved_at = step, time.monotonic()
             yield record
             if stopped:
                 return

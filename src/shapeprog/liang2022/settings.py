@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
@@ -47,8 +48,15 @@ class TrainingSettings:
             if hints[name] in (int, float):
                 least, most = name in AT_LEAST_ONE, 1 if name in SHARES else math.inf
                 check_number(name, value, least, most, whole=hints[name] is int)
-            elif isinstance(value, str) == (get_origin(hints[name]) is tuple):
-                raise ShapeProgError(f"{name} is {value!r}", f"give a {'tuple' if isinstance(value, str) else 'text'}")
+            else:
+                given = value if isinstance(value, list | tuple) else (value,)
+                several = get_origin(hints[name]) is tuple
+                texts = tuple(os.fspath(one) if isinstance(one, os.PathLike) else one for one in given)
+                if several == (given is not value) or not all(isinstance(one, str) for one in texts):
+                    raise ShapeProgError(f"{name} is {value!r}", f"give a {'tuple of texts' if several else 'text'}")
+                object.__setattr__(self, name, texts if several else texts[0])
+        if self.beta1 == 1:
+            raise ShapeProgError("beta1 is 1", "give a number of 0 or more, below 1")
 
     def learning_rate_at(self, samples_seen: int) -> float:
         """Learning rate after so many shapes."""

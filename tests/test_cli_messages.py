@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import Run, table
+from commands import PROGRAM, Run, table
 
+from shapeprog import inference
+from shapeprog.cli.terminal import at
+from shapeprog.errors import ShapeProgError
 from shapeprog.language.named import names as named
 from shapeprog.language.parser import parse
 
@@ -108,14 +113,100 @@ def test_infer_replaces_its_own_results_but_no_edited_text_unless_it_may(run: Ru
     assert "two.json" in ended.out
     assert "--overwrite" in ended.err
     (tmp_path / "res" / "one.json").unlink()
-    ended = run(*words)
-    assert (ended.code, text.read_text()) == (1, edited)
-    assert "it has no one.json beside it" in ended.err
+    for also in ([], ["--overwrite"]):  # not known to be a result
+        assert run(*words, *also).code == 0
+        assert text.read_text() == edited
+    assert (tmp_path / "res" / "one_2.shape").read_text() == written
+    text, ours = tmp_path / "res" / "two.shape", (tmp_path / "res" / "two.shape").read_text()
+    text.write_text(edited)
     assert run(*words, "--overwrite").code == 0
-    assert text.read_text() == written
-    assert len(list((tmp_path / "res").iterdir())) == 6
+    assert text.read_text() == ours
+    assert len(list((tmp_path / "res").iterdir())) == 8
     text.unlink()
     assert run(*words).code == 0
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("suffix", [".json", ".shape", ".glb"])
+def test_results_that_were_written_in_part_are_replaced_by_the_next_run(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+):
+    table(tmp_path / "one.obj")
+    words = ["infer", "one.obj", "--out", "res", "--no-picture"]
+    assert run(*words).code == 0
+    before = (tmp_path / "res" / "one.json").read_text()
+    replace = os.replace
+
+    def fail(old: Path, new: Path) -> None:
+        if new.suffix == suffix:
+            raise OSError(errno.ENOSPC, "full", str(new))
+        replace(old, new)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", fail)
+        ended = run(*words, "--seed", 1, "--file-unit", "cm")
+        assert (ended.code, "the disk is full" in ended.err) == (2, True)
+    assert ((tmp_path / "res" / "one.json").read_text() == before) == (suffix == ".json")
+    assert run(*words).code == 0
+    assert sorted(path.name for path in (tmp_path / "res").iterdir()) == ["one.glb", "one.json", "one.shape"]
+    assert (tmp_path / "res" / "one.json").read_text() == before
+
+
+def test_an_edit_during_inference_and_a_result_of_another_run_are_kept(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    for name in ("one", "two"):
+        table(tmp_path / f"{name}.obj")
+    (tmp_path / "res").mkdir()
+    text = tmp_path / "res" / "one.shape"
+    calls = []
+
+    def infer(shape, **_):
+        calls.append(shape.name)
+        if len(calls) == 3:
+            text.write_text("# edited\n")
+        if len(calls) == 4:
+            (tmp_path / "res" / "two.json").write_text("{}")
+        return inference.Result(PROGRAM, PROGRAM.snap(), {}, "Stopped at once.", (), seconds=0.1)
+
+    monkeypatch.setattr(inference, "infer", infer)
+    words = ["infer", "one.obj", "two.obj", "--out", "res", "--no-picture"]
+    assert run(*words).code == 0
+    ended = run(*words)
+    assert (ended.code, text.read_text()) == (1, "# edited\n")
+    assert "one.obj: res/one.shape is not replaced" in ended.err
+    assert (tmp_path / "res" / "two.json").read_text() == "{}"
+    assert (tmp_path / "res" / "two_2.json").exists()
+    assert "one.shape is not replaced" in run(*words).err
+    assert calls == ["one", "two", "one", "two", "two"]  # what cannot be written is not inferred again
+
+
+@pytest.mark.parametrize(
+    ("path", "message", "told"),
+    [
+        ("in/chair.obj", "chair.obj is empty", "in/chair.obj is empty"),
+        ("in/chair.obj", "chair: 3 positions", "in/chair.obj: 3 positions"),
+        ("in/chair.obj", "chair is a line", "in/chair.obj is a line"),
+        ("in/x.npy#1", "x#1 holds voxels", "in/x.npy#1 holds voxels"),
+        ("in/x.npz#1", "x.npz: a has no occupied cell", "in/x.npz#1: a has no occupied cell"),
+        ("chair.obj", "chair.shape is not replaced", "chair.obj: chair.shape is not replaced"),
+        ("in/a.obj", "a point cloud needs normals", "in/a.obj: a point cloud needs normals"),
+        ("in/a", "a point cloud needs normals", "in/a: a point cloud needs normals"),
+    ],
+)
+def test_messages_lose_the_name_of_their_own_input_only(path: str, message: str, told: str):
+    assert at(Path(path), ShapeProgError(message, "a cure")).message == told
+
+
+@pytest.mark.usefixtures("quick")
+def test_shapes_of_packs_are_told_by_name(run: Run, tmp_path: Path):
+    voxels = np.packbits(np.ones((2, 32**3), bool), axis=1)
+    np.savez(tmp_path / "chairs.npz", ids=np.array(["chair", "s"]), voxels=voxels)
+    ended = run("infer", "chairs.npz", "--no-picture")
+    assert [line for line in ended.out.splitlines() if line.startswith("chairs.npz")] == [
+        "chairs.npz#0: chair",
+        "chairs.npz#1: s",
+    ]
 
 
 TABLE = """\

@@ -124,6 +124,25 @@ def test_conversions_keep_dimensions_to_a_hundredth_of_a_millimetre(run: Run, tm
     assert "= 0.6, 0.46, 0.725\nthickness = 0.018\n" in (tmp_path / "m.shape").read_text()
 
 
+def test_conversions_keep_the_parts_of_small_objects_together(run: Run, tmp_path: Path) -> None:
+    sizes = "width, depth, height = 0.11111, 0.1, 0.2\ntop(top=0, height=0.1)\n"
+    (tmp_path / "bead.shape").write_text(f"# unit: cm\n{sizes}leg(bottom=0, height=0.1001, width=0.03333)\n")
+    for unit, width, leg in (("mm", "1.1111", "1.001"), ("in", "0.043744", "0.039409"), ("m", "0.0011111", "0.001001")):
+        assert run("export", "bead.shape", f"{unit}.shape", "--unit", unit).code == 0
+        text = (tmp_path / f"{unit}.shape").read_text()
+        assert f"width, depth, height = {width}, " in text
+        assert f"height={leg}" in text
+
+
+def test_statements_in_cells_are_exported_in_cells(run: Run, tmp_path: Path) -> None:
+    export(PROGRAM, tmp_path / "old.shape", FRAME)
+    ended = run("export", "old.shape", "new.shape", "--unit", "cells")
+    assert ended.code == 0, ended.err
+    assert (tmp_path / "new.shape").read_text() == (tmp_path / "old.shape").read_text()
+    ended = run("export", "old.shape", "cm.shape", "--unit", "cm")
+    assert (ended.code, "statements in cells have no unit" in ended.err) == (2, True)
+
+
 def test_without_a_frame_files_count_in_the_unit_of_the_program(run: Run, tmp_path: Path) -> None:
     (tmp_path / "cells.shape").write_text(NAMED)
     export(in_unit(parse(NAMED), Unit("cm", 4)), tmp_path / "cm.shape")

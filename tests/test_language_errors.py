@@ -273,12 +273,20 @@ def test_a_list_of_programs_has_no_text() -> None:
         ("leg(left=3 1/2, width=2)", "write 3.5 for 3 1/2"),
         ("leg(width=2, left=1, height=10 3 / 16)", "write 10.1875 for 10 3 / 16"),
         ("thickness = 0 3/4", "write 0.75 for 0 3/4"),
+        ("leg(left=3 1/2, width=2)  # 7 1/4", "write 3.5 for 3 1/2"),
     ],
 )
 def test_mixed_fractions_are_told_as_decimals(line: str, hint: str) -> None:
     with pytest.raises(ProgramError) as error:
         parse(f"width, depth, height = 8, 8, 24\n{line}\n")
     assert (error.value.line, error.value.hint) == (2, hint)
+
+
+@pytest.mark.parametrize("line", ["thickness = 12.5 1/2", "leg2 1/2", "leg(left=3 width=2)  # 3 1/2"])
+def test_other_mistakes_are_not_taken_for_mixed_fractions(line: str) -> None:
+    with pytest.raises(ProgramError) as error:
+        parse(f"width, depth, height = 8, 8, 24\n{line}\n")
+    assert " for " not in error.value.hint.replace("for _ in", "")
 
 
 @pytest.mark.parametrize("comment", ["# unit: cm", "# Units = cm"])

@@ -86,8 +86,9 @@ def infer_command(
 
     def inferred(shape: Shape, progress: Callable[[str, float], None]) -> tuple[Result, list[str]]:
         """What was inferred from a shape, and the names of the files."""
-        stem = free_stem(shape, stems, folder, overwrite)
+        free_stem(shape, set(stems), folder, overwrite)  # what is not replaced is told before the work
         result = measured(inference(shape, progress=progress), shape, seed)
+        stem = free_stem(shape, stems, folder, overwrite)  # again: files may have been written or edited meanwhile
         names = write(result, shape, folder, stem)
         if not no_picture:
             picture(shape, result.program, folder / f"{stem}.png", scores=result.scores)
@@ -154,7 +155,8 @@ def _report(
     from shapeprog.view.page import scores_text
 
     console = terminal.output()
-    console.print(f"{path}" if shape.name.partition("#")[0] in str(path) else f"{path}: {shape.name}", style="bold")
+    named = shape.name.partition("#")[0] == Path(path.name.partition("#")[0]).stem
+    console.print(f"{path}" if named else f"{path}: {shape.name}", style="bold")
     if shape.kind != "mesh":
         kind = f"a point cloud; normals are estimated from up to {SCAN:,} points"
         console.print(f"Read as {'voxels' if shape.points is None else kind}.", style="dim")

@@ -12,10 +12,10 @@ from shapeprog.data.loading import ARRAY_SUFFIXES
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.metrics import evaluate_program
-from shapeprog.files import write_text
+from shapeprog.files import atomic_path
 from shapeprog.formats import export
 from shapeprog.formats.json_form import program_to_json, read_result
-from shapeprog.formats.shape import read_text
+from shapeprog.formats.shape import program_text, read_text
 from shapeprog.inference.infer import Result
 from shapeprog.language.printer import format_program
 
@@ -43,17 +43,25 @@ def document(result: Result, shape: Shape) -> str:
 
 
 def write(result: Result, shape: Shape, folder: Path, stem: str) -> list[str]:
-    """Write a result as JSON and text, and its solids as GLB; returns the names of the files."""
-    write_text(folder / f"{stem}.json", document(result, shape))
-    suffixes = (".shape", ".glb") if result.program.size else (".shape",)
-    written = [export(result.program, folder / f"{stem}{suffix}", shape.frame) for suffix in suffixes]
-    return [f"{stem}.json", *(path.name for path in written)]
+    """Write a result as JSON and text, and its solids as GLB; returns the names of the files.
+
+    Wherever this is interrupted, no text is left beside the JSON of another run, as if it had been edited.
+    """
+    text = folder / f"{stem}.shape"
+    with atomic_path(text) as new_text, atomic_path(folder / f"{stem}.json") as new_json:
+        new_text.write_bytes(program_text(result.program, shape.frame).encode("utf-8", "surrogateescape"))
+        new_json.write_bytes(document(result, shape).encode("utf-8", "surrogateescape"))
+        text.unlink(missing_ok=True)  # the JSON, which holds it too, is renamed first
+    if result.program.size:
+        export(result.program, folder / f"{stem}.glb", shape.frame)
+    return [f"{stem}{suffix}" for suffix in (".json", ".shape", *([".glb"] if result.program.size else []))]
 
 
 def free_stem(shape: Shape, stems: set[str], folder: Path, overwrite: bool = False) -> str:
     """A file name that neither another shape, of this run or an earlier one, nor another file has.
 
-    The same input may replace its own results; a ``ShapeProgError`` if their text was edited, unless ``overwrite``.
+    The same input may replace its own results, which are known by their .json; a ``ShapeProgError`` if their .shape
+    differs from the text in it, unless ``overwrite``.
     """
     base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._")[:_LONGEST] or "shape"
     stem, number = base, 1
@@ -65,27 +73,26 @@ def free_stem(shape: Shape, stems: set[str], folder: Path, overwrite: bool = Fal
 
 
 def _replaceable(shape: Shape, folder: Path, stem: str, overwrite: bool) -> bool:
-    """Whether there are no files of that name, or only earlier results of the same shape; an error if these may be
-    edited, unless ``overwrite``."""
+    """Whether there are no files of that name, or only earlier results of the same shape, with their .json; an error if
+    their text may be edited, unless ``overwrite``."""
     if shape.source is not None and shape.source.resolve() == (folder / f"{stem}{shape.source.suffix}").resolve():
         return False
     if not any((folder / f"{stem}{suffix}").exists() for suffix in _SUFFIXES):
         return True
-    text, result, written = folder / f"{stem}.shape", folder / f"{stem}.json", None
-    if result.exists():
-        try:
-            if read_result(result).source != _source(shape):
-                return False
-        except ShapeProgError:
+    text, result = folder / f"{stem}.shape", folder / f"{stem}.json"
+    if not result.exists():
+        return False
+    try:
+        if read_result(result).source != _source(shape):
             return False
-        written = json.loads(read_text(result))["text"].splitlines()
-    if not text.exists():
-        return written is not None
-    if overwrite or read_text(text).splitlines() == written:
+    except ShapeProgError:
+        return False
+    if overwrite or not text.exists():
         return True
-    cause = f"has no {result.name} beside it" if written is None else f"differs from the text in {result.name}"
+    if read_text(text).splitlines() == json.loads(read_text(result))["text"].splitlines():
+        return True
     cure = "it may have been edited: --overwrite replaces it, --out FOLDER writes to another folder"
-    raise ShapeProgError(f"{text} is not replaced: it {cause}", cure)
+    raise ShapeProgError(f"{text} is not replaced: it differs from the text in {result.name}", cure)
 
 
 def _source(shape: Shape) -> str | None:

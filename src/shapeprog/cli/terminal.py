@@ -192,8 +192,10 @@ def at(path: Path, error: ShapeProgError) -> ShapeProgError:
     """The error with the path of the file that it is about, in place of the name of that file or shape in front."""
     if str(path) in error.message:
         return error
-    stem = re.escape(Path(path.name.partition("#")[0]).stem)
-    named = re.match(rf"{stem}(\.\w+)?(#\w+)?(?=:? )", error.message)
+    file = Path(path.name.partition("#")[0])
+    name, stem = re.escape(file.name), re.escape(file.stem)
+    whole = rf"{name}(#\S+?)?(?=:? )|" if file.suffix else ""  # without a suffix it may be a word, such as "a"
+    named = re.match(rf"{whole}{stem}(#\S+?(?=:? )|(?=: | (is|has|holds|lies) ))", error.message)
     message = error.message[named.end() :] if named else f": {error.message}"
     return ShapeProgError(f"{path}{message}", error.hint)
 

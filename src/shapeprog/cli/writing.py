@@ -88,7 +88,8 @@ def export_command(
                 from shapeprog.language.dimensions import in_unit
 
                 asked_unit = terminal.asked_unit(loaded.unit, frame, program, unit, file_unit)
-                written = in_unit(loaded, asked_unit, workshop=True)
+                if asked_unit != loaded.unit:  # statements in cells can be in no other
+                    written = in_unit(loaded, asked_unit, workshop=True)
             export(written, path, frame, **asked)
         except ShapeProgError as error:  # the other files do not depend on this one
             failures.append(error)

@@ -36,9 +36,11 @@ from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.statement import language
 from shapeprog.language.unit import METRES, Unit
+from shapeprog.space import SPAN
 
 DIGITS = 6  # digits of a length that is converted: float32 has two more, which would show that it was
 FINEST = 1e-5  # metres to which lengths are rounded that a person has written, and the least digits that they keep
+FINEST_SHARE = 1e-4  # of the longest side, to which they are rounded at most
 LEAST_DIGITS = 3
 
 _NOTHING = 1e-9
@@ -117,7 +119,8 @@ def _scoped_uses(lines: Iterable[Line], scope: Scope) -> Iterator[tuple[Use, Sco
 def in_unit(program: Program, unit: Unit | None, workshop: bool = False) -> Program:
     """The same placed program with its lengths in a unit, or in cells; unchanged if it is in this unit.
 
-    Lengths keep six digits; for a ``workshop`` they are rounded to .01 mm or .001 in.
+    Lengths keep six digits; for a ``workshop`` they are rounded to .01 mm or .001 in, and where the object is small to
+    at most a 10,000th of its longest side, so that its parts stay together.
 
     Raises
     ------
@@ -130,6 +133,8 @@ def in_unit(program: Program, unit: Unit | None, workshop: bool = False) -> Prog
     if source.unit == unit:
         return program
     factor = unit.per_cell / source.unit.per_cell
+    decimals = -math.log10(FINEST / METRES[unit.name]) if unit.name else 0.0
+    decimals = max(math.floor(decimals), math.ceil(-math.log10(FINEST_SHARE * SPAN * unit.per_cell)))
 
     def change(number: float, power: float) -> float:
         if not power or not number:
@@ -137,7 +142,7 @@ def in_unit(program: Program, unit: Unit | None, workshop: bool = False) -> Prog
         result = number * factor**power
         if workshop and power == 1 and unit.name:
             least = LEAST_DIGITS - 1 - math.floor(math.log10(abs(result)))
-            return to_float32(round(result, max(least, math.floor(-math.log10(FINEST / METRES[unit.name])))))
+            return to_float32(round(result, max(least, decimals)))
         return to_float32(float(f"{result:.{DIGITS}g}"))
 
     return _scaled(Source(_Powers(source).changed(source.lines, change), unit), source)

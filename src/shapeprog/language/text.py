@@ -31,6 +31,7 @@ _SYNTAX_HINTS = {
     "unexpected indent": "only lines in a loop, group or function are indented",
 }
 _SYNTAX_HINT = "a line is a part, name = number, for _ in ...:, with inside(...):, or def name(...):"
+_MIXED = re.compile(r"(?<![\w.])(\d+)[ \t]+(\d+)[ \t]*/[ \t]*0*([1-9]\d*)")  # 5 1/2
 _SHOWN = 60
 
 
@@ -69,7 +70,7 @@ class Text:
             column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
             message = (error.msg or "").split(";")[0].removeprefix("invalid syntax").strip(". ") or "unexpected word"
             hint = next((hint for words, hint in _SYNTAX_HINTS.items() if words in message), _SYNTAX_HINT)
-            if mixed := re.search(r"(\d+)[ \t]+(\d+)[ \t]*/[ \t]*0*([1-9]\d*)", self.lines[row - 1]):
+            if mixed := _MIXED.search(self.lines[row - 1].partition("#")[0]):
                 whole, part, parts = (float(digits) for digits in mixed.groups())
                 hint = f"write {whole + part / parts:.6g} for {mixed[0]}"
             for word, ours in _WORDS_OF_PYTHON.items():

@@ -143,8 +143,10 @@ def test_results_that_were_written_in_part_are_replaced_by_the_next_run(
         replace(old, new)
 
     with monkeypatch.context() as patch:
+        other = inference.Result(parse(TABLE), None, {}, "Stopped at once.", (), seconds=0.1)
+        patch.setattr(inference, "infer", lambda *_, **__: other)
         patch.setattr(os, "replace", fail)
-        ended = run(*words, "--seed", 1, "--file-unit", "cm")
+        ended = run(*words)
         assert (ended.code, "the disk is full" in ended.err) == (2, True)
     assert ((tmp_path / "res" / "one.json").read_text() == before) == (suffix == ".json")
     assert run(*words).code == 0

@@ -6,14 +6,13 @@ import math
 import operator
 from typing import Any
 
-import numpy as np
-
 from shapeprog.errors import ShapeProgError
 
 
 def number_of(value: Any, *, whole: bool = False) -> float:
     """A value as a number, not a number (NaN) if it is none; booleans and text are none."""
-    if isinstance(value, (bool, np.bool_, str, bytes, bytearray)):
+    is_truth = isinstance(value, bool) or str(getattr(value, "dtype", "")).endswith("bool")  # of NumPy, torch
+    if is_truth or isinstance(value, str | bytes | bytearray):
         return math.nan
     try:
         return float(operator.index(value)) if whole else float(value)

@@ -1,6 +1,6 @@
 """Losses of adaptation: of renderings (section 4.3), and of ids, which a renderer gives no gradient (end of 4.2).
 
-A loss of renderings is a function of a :class:`Comparison`, declared by :func:`loss`, with one value for each shape of
+A loss of renderings is a function of a :class:`Comparison`, declared by ``loss``, with one value for each shape of
 the batch; lengths are in cells, and ``scene.distance`` is negative inside.  README.md has an example.  The gradient of
 ids is estimated: programs are sampled, and the log-probability of their ids is weighed by the advantage, the cost above
 a baseline (REINFORCE, Williams 1992).  The cost in adaptation is 1 - IoU of the canvas.  The baseline is a network

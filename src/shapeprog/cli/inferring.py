@@ -86,7 +86,7 @@ def infer_command(
 
     def inferred(shape: Shape, progress: Callable[[str, float], None]) -> tuple[Result, list[str]]:
         """What was inferred from a shape, and the names of the files."""
-        free_stem(shape, set(stems), folder, overwrite)  # what is not replaced is told before the work
+        free_stem(shape, set(stems), folder, overwrite)  # refuses edited files before the search starts
         result = measured(inference(shape, progress=progress), shape, seed)
         stem = free_stem(shape, stems, folder, overwrite)  # again: files may have been written or edited meanwhile
         names = write(result, shape, folder, stem)

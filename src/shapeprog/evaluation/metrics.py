@@ -173,12 +173,12 @@ def evaluate_program(
 
 def with_likeness(row: Metrics, predicted: Triangles | None, target: Shape, seed: int = 0) -> Metrics:
     """The measures with the likeness of a predicted mesh, ``None`` where it has no surface, to the target."""
-    mesh, halves, prediction_seed = _mesh(target), _halves(target, seed), seed
+    mesh, prediction_seed = _mesh(target), seed
     if mesh is not None:
         *seeds, prediction_seed = np.random.SeedSequence((seed, 1)).generate_state(3).tolist()
         first, second = (likeness.sampled(mesh, sample_seed) for sample_seed in seeds)
         surface = first
-    elif halves is not None:
+    elif (halves := _halves(target, seed)) is not None:
         first, second, surface = map(Samples, (*halves, np.concatenate(halves)))
     else:
         return row
@@ -248,11 +248,11 @@ def target_samples(target: Shape, points: int, seed: int) -> tuple[Cloud, Cloud]
     From a mesh both have ``points`` points.  Otherwise they are two halves of the points at hand, each of at most
     ``points``: with fewer than twice as many at hand the noise floor reads too high.
     """
-    mesh, halves = _mesh(target), _halves(target, seed)
+    mesh = _mesh(target)
     if mesh is not None:
         seeds = np.random.SeedSequence(seed).generate_state(2).tolist()
         first, second = (likeness.sampled(mesh, sample_seed, points).points for sample_seed in seeds)
-    elif halves is not None:
+    elif (halves := _halves(target, seed)) is not None:
         first, second = (half[:points] for half in halves)
     else:
         return None

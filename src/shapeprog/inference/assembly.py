@@ -134,9 +134,9 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     the error of the coverage; and a row loses a copy that costs nothing, such as a shelf inside the top.
     """
     options = [(index, node, 0.005) for index, node in enumerate(start.body)]
-    for index, block in enumerate(adjusted.body):
+    for index, (block, chain) in enumerate(zip(adjusted.body, adjusted.chains, strict=True)):
         options += [(index, node, -0.001) for node in shorter(block)]
-        options += [(index, node, -0.00001) for node in recounted(block, -1)]
+        options += [(index, node, -0.00001) for node in recounted(chain, -1)]
     nodes = [*adjusted.body, *(node for _, node, _ in options)]
     table, selected = _table(nodes, coverage), tuple(range(len(start.body)))
     text = [(price, Program((node,)).size) for price, node in zip(table.prices, nodes, strict=True)]

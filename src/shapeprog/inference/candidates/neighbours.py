@@ -48,7 +48,7 @@ def neighbours(program: Program) -> list[Node]:
             edited = list(met(box, parts))
             edited += [middle for candidate in [box, *edited] for middle in centred(candidate)]
             result += [node for candidate in edited for node in redrawn(chain, candidate)]
-            result += [*recounted(nest(chain), -1), *recounted(nest(chain), 1), *_filled(chain)]
+            result += [*recounted(chain, -1), *recounted(chain, 1), *_filled(chain)]
     for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
         if box is not None and other_box is not None and _loops(chain) == _loops(other):
             merged = (drawing for around in _merged(box, other_box) for drawing in drawings(around))
@@ -90,9 +90,8 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
                 yield nest((mirror(axis), *chain[1:]))
 
 
-def recounted(node: Node, more: int) -> Iterator[Node]:
+def recounted(chain: Chain, more: int) -> Iterator[Node]:
     """A run with so many copies more, at its end or at its beginning."""
-    (chain,) = Program((node,)).chains
     for index, loop in enumerate(chain[:-1]):
         if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2:
             count, step = float(loop.count + more), loop.values[1:]

@@ -90,9 +90,7 @@ class CoverageTable(NamedTuple):
     rows: Bits
     weights: FloatArray  # value of a bit of each of the first E + N + F + K words, negative for free points
     evidence: int  # E, the number of words for points to be explained
-    interior: (
-        Bits  # points deeper inside each candidate than the tolerance (C, E + N): no other candidate explains them
-    )
+    interior: Bits  # points deeper inside each candidate than the tolerance (C, E + N), which no other one explains
     exposed: Bits  # unsupported samples of the surface of each candidate that it does not hide itself (C,)
     sample_price: FloatArray  # price of each of these samples (C,)
     prices: FloatArray  # price of the text of each candidate (C,)

@@ -15,7 +15,7 @@ from shapeprog.errors import DeclarationError, InputError, ShapeProgError
 from shapeprog.formats.plugins import load_statements
 from shapeprog.geometry import Solids
 from shapeprog.language import Language, decode, encode, loop, standard, statement, unroll, using
-from shapeprog.language.parameters import Count, Extent, Length, Position, Quantity, Shift3
+from shapeprog.language.parameters import Axis, Count, Extent, Length, Position, Quantity, Shift3, Two
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.shapes import box
@@ -77,6 +77,31 @@ def no_batch(at: Position, size: Extent) -> Solids:
     return box(at[0], size[0])
 
 
+def no_single(at: Position, size: Extent) -> Solids:
+    """Needs leading dimensions."""
+    return box(at[:, [0, 1, 2]], size)
+
+
+def part_of_a_copy(at: Position, n: Count = 2.5) -> Solids:  # type: ignore[assignment]
+    """Half a copy."""
+    return box(at, at)
+
+
+def no_axis(at: Position, a: Axis = 7) -> Solids:  # type: ignore[assignment]
+    """There are three axes."""
+    return box(at, at)
+
+
+def no_number(at: Position, a: Length = "r") -> Solids:  # type: ignore[assignment]
+    """Text."""
+    return box(at, at)
+
+
+def three_numbers(at: Position = 0) -> Solids:  # type: ignore[assignment]
+    """A point has three numbers."""
+    return box(at, at)
+
+
 def failing(at: Position, size: Length) -> Solids:
     """Fails."""
     return box(at, size[..., 5])
@@ -105,10 +130,20 @@ def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solid
         ("crate", {}, no_kind, "parameter 'size' of statement 'crate' has no kind"),
         ("crate", {}, too_wide, "18 numbers, but a statement has at most 16"),
         ("crate", {}, wrong_shape, "solids of shapes|Type-check error"),
-        ("crate", {}, no_batch, "solids of shapes"),
+        ("crate", {}, no_batch, "cannot be drawn"),
+        ("crate", {}, no_single, "cannot be drawn: too many indices"),
         ("crate", {}, failing, "cannot be drawn: index 5"),
         ("crate", {}, nothing, "solids of shapes"),
         ("crate", {}, backwards, "ends before it starts"),
+        ("crate", {}, part_of_a_copy, "wrong default: n of crate is 2.5, but must be whole"),
+        ("crate", {}, no_axis, "wrong default: .* not an axis"),
+        ("crate", {}, no_number, "wrong default"),
+        ("crate", {}, three_numbers, "wrong default: at of crate takes 3 numbers"),
+        ("crate", {"id": 1.5}, crate, "wants id 1.5"),
+        ("crate", {"id": 1 << 70}, crate, "wants id 118"),
+        ("crate", {"pivot": lambda at: at}, crate, "cannot be drawn: .* unexpected keyword"),
+        ("crate", {"pivot": lambda at, **_: at[..., :2]}, crate, "solids of shapes"),
+        ("crate", {"hint": lambda _: [[1.0, 2.0]]}, crate, "the hint of statement 'crate' yields 2 numbers"),
     ],
 )
 def test_bad_statements_are_refused(
@@ -135,9 +170,37 @@ def absent(copy: torch.Tensor, quarter: torch.Tensor, count: Count) -> None:
     """Returns nothing."""
 
 
+def thrice(copy: torch.Tensor, quarter: torch.Tensor, count: Count = 3) -> Motion:  # type: ignore[assignment]
+    """Text could leave its count out."""
+    return Motion()
+
+
+def twice(copy: torch.Tensor, quarter: torch.Tensor, count: Two) -> Motion:
+    """Text always leaves its count out."""
+    return Motion()
+
+
+def bent(copy: torch.Tensor, quarter: torch.Tensor, count: Count) -> Motion:
+    """A rotation in the plane."""
+    return Motion(rotation=torch.eye(2))
+
+
+def off(copy: torch.Tensor, quarter: torch.Tensor, count: Count) -> Motion:
+    """A pivot in the plane."""
+    return Motion(pivot=torch.zeros(2))
+
+
 @pytest.mark.parametrize(
     ("function", "words"),
-    [(still, "no count"), (flat, "a motion of shapes|Type-check error"), (absent, "cannot be moved")],
+    [
+        (still, "no count"),
+        (flat, "a motion of shapes|Type-check error"),
+        (absent, "cannot be moved"),
+        (thrice, "needs a first argument without a default"),
+        (twice, "needs a first argument"),
+        (bent, "a motion of shapes|Type-check error"),
+        (off, "a motion of shapes|Type-check error"),
+    ],
 )
 def test_bad_loops_are_refused(function: Callable[..., Any], words: str) -> None:
     with pytest.raises(DeclarationError, match=words):
@@ -201,3 +264,13 @@ def test_missing_modules_are_named(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "none.py"):
         with pytest.raises(InputError, match=str(path)):
             load_statements(path)
+
+
+def test_defaults_are_rounded_as_text_is(empty: Language) -> None:
+    @statement("crate")
+    def crate(at: Position, size: Length = 0.1) -> Solids:  # type: ignore[assignment]
+        """A crate."""
+        return box(at, size[..., None].expand(at.shape))
+
+    program = parse("crate(at=(1, 2, 3))")
+    assert parse(format_program(program)) == program

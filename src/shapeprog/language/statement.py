@@ -15,13 +15,15 @@ import keyword
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count
 from typing import Any, get_type_hints
 
+import numpy as np
 from jaxtyping import Float
 
+from shapeprog.arguments import number_of
 from shapeprog.errors import DeclarationError, ShapeProgError
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitive import SIZES
@@ -240,6 +242,10 @@ class Language:
             yield f"{declared.name!r} is not a Python identifier", WORDS
         if declared.is_loop and [p.quantity.kind for p in declared.parameters][:1] != ["count"]:
             yield f"loop {declared.name!r} has no count", "annotate its first parameter with Count"
+        elif declared.is_loop and [p.default for p in declared.parameters if p.quantity.written_out][:1] != [None]:
+            yield f"loop {declared.name!r} needs a first argument without a default", "leave the default out"
+        if type(declared.id) is not int or not 0 <= declared.id < 1 << 31:
+            yield f"{what} wants id {declared.id!r}", "give a whole number below 2^31, or leave the id out"
         if declared.size > MOST_SLOTS:
             limit = f"{declared.size} numbers, but a statement has at most {MOST_SLOTS}"
             yield f"{what} has {limit}", "use fewer or narrower parameters"
@@ -343,11 +349,14 @@ def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], 
                 "annotate it with one of Position, Extent, Half, Section, Length, Radius, Radii, Place, Shift, Shift3, "
                 "Angle, Count, Turn, Axis",
             )
-        default = None if argument.default is inspect.Parameter.empty else float(argument.default)
-        if default is not None and quantity.width > 1:
-            message = f"parameter {word!r} of statement {name!r} has a default, but more than one number"
-            raise DeclarationError(message, "leave the default out")
-        parameters.append(Parameter(word, quantity, start, default))
+        parameter = Parameter(word, quantity, start)
+        if argument.default is not inspect.Parameter.empty:
+            try:
+                (default,) = parameter.checked(name, [number_of(argument.default)])
+            except ShapeProgError as mistake:
+                raise DeclarationError(f"wrong default: {mistake.message}", mistake.hint) from None
+            parameter = replace(parameter, default=default)
+        parameters.append(parameter)
         start += quantity.width
     doc = doc or inspect.getdoc(function) or ""
     if not doc:
@@ -360,24 +369,34 @@ def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], 
 
 def _try(declared: Statement) -> None:
     """Draw or move once with mid-range parameters, so that a wrong shape is refused now and not amid a run."""
-    values = torch.zeros(2, declared.size)
-    values[:] = torch.tensor([(quantity.low + quantity.high) / 2 for quantity in declared.quantities])
-    kind = "loop" if declared.is_loop else "statement"
+    values = torch.tensor([(quantity.low + quantity.high) / 2 for quantity in declared.quantities]).repeat(2, 1)
+    parts: list[tuple[Tensor | None, tuple[int, ...]]] = []  # with their shapes
     try:
         if declared.move is not None:
             motion = declared.move(torch.arange(2.0), torch.zeros(2, dtype=torch.bool), **declared.split(values))
-            moved = (motion.turn, motion.shift, motion.signs)
-            shapes: list[Any] = [part if part is None else tuple(part.shape) for part in moved]
-            fitting = shapes[0] in (None, (2,)) and all(shape in (None, (2, 3)) for shape in shapes[1:])
-            result, requirement = "a motion", "a turn must be (...), a shift and signs (..., 3)"
+            parts += [(motion.turn, (2,)), (motion.rotation, (2, 3, 3))]
+            parts += [(part, (2, 3)) for part in (motion.pivot, motion.shift, motion.signs)]
+            what = f"loop {declared.name!r} returns a motion"
+            requirement = "a turn must be (...), a rotation (..., 3, 3), a pivot, a shift and signs (..., 3)"
         else:
-            shapes = [(tuple(solids.size.shape), tuple(solids.centre.shape)) for solids in declared.solids(values)]
-            fitting = bool(shapes) and all(pair == ((2, SIZES), (2, 3)) for pair in shapes)
-            result, requirement = "solids", "sizes must be (..., 4) and centres (..., 3)"
+            for numbers in (values, values[0]):
+                lead = tuple(numbers.shape[:-1])
+                for solids in declared.solids(numbers):
+                    parts += [(solids.size, (*lead, SIZES)), (solids.centre, (*lead, 3))]
+            if parts and declared.pivot is not None:
+                parts.append((declared.pivot(**declared.split(values)), (2, 3)))
+            what = f"statement {declared.name!r} returns solids"
+            requirement = "sizes must be (..., 4), centres and a pivot (..., 3)"
+        shapes = [None if part is None else tuple(part.shape) for part, _ in parts]
+        box = Box(np.zeros(3), np.eye(3), np.array([6.0, 1.0, 1.0]))
+        starts = [len(start) for start in (declared.hint(box) if declared.hint else ())]
     except Exception as cause:
         message = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
-        hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions"
+        hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions or none"
         raise DeclarationError(message, hint) from cause
-    if not fitting:
-        message = f"{kind} {declared.name!r} returns {result} of shapes {shapes}"
+    if not parts or any(shape not in (None, right) for shape, (_, right) in zip(shapes, parts, strict=True)):
+        message = f"{what} of shapes {shapes}"
         raise DeclarationError(message, f"{requirement} with the leading dimensions of the parameters")
+    if any(count != declared.size for count in starts):
+        message = f"the hint of statement {declared.name!r} yields {starts[0]} numbers"
+        raise DeclarationError(message, f"yield {declared.size}, one for each number of its parameters")

@@ -5,6 +5,7 @@ A side, a size or an offset becomes coordinates; ``inside`` vanishes; ``row`` an
 
 from __future__ import annotations
 
+import itertools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -154,13 +155,15 @@ class Lowering(ABC):
 
     def _between(self, line: Part, part: Placed, role: str) -> Drawn:
         """A solid between points."""
-        points: list[Vector] = []
+        named: dict[str, Vector] = {}
         for word in POINTS:
             if word in part.keywords:
-                points.append(self._place(part, word, part.keywords[word], points[0] if points else None))
+                named[word] = self._place(part, word, part.keywords[word], named.get("start"))
+        points = [*named.values()]
         start, end = points[0], points[-1]
-        if self.exact and not self._length(math.dist(start, end)) > SMALLEST:
-            raise Fault(line, "start and end are the same point", "move one of them", "end")
+        for (first, one), (second, other) in itertools.combinations(named.items(), 2) if self.exact else ():
+            if not self._length(math.dist(one, other)) > SMALLEST:
+                raise Fault(line, f"{first} and {second} are the same point", "move one of them", second)
         grid = [number for point in points for number in self._point(point)]
         element = tuple((value, value) for value in start)
         if line.kind != "bar":

@@ -94,9 +94,9 @@ PINNED = [
         "  hint: use a part, a loop, with inside(...), a function or name = number",
     ),
     (
-        "leg(1, 2, 3)",
+        "leg(1, size=(1, 2, 3))",
         "t.shape, line 1, column 5: leg takes nothing without a name\n"
-        "  leg(1, 2, 3)\n"
+        "  leg(1, size=(1, 2, 3))\n"
         "      ^\n"
         "  hint: write leg(at=(_, _, _), size=(_, _, _))",
     ),
@@ -134,9 +134,9 @@ def test_messages(text: str, message: str) -> None:
         (f"for i in {LEG}:\n    pass", 1, 10, "not a loop"),
         ("leg", 1, 1, "no statement"),
         ("leg.__class__()", 1, 1, "not declared"),
-        ("__import__('os').system('x')", 1, 1, "is not a statement"),
-        ("leg(**{})", 1, 5, "no parameter"),
-        ("leg(*a)", 1, 5, "without a name"),
+        ("__import__('os').system('x')", 1, 1, "the size is not declared"),
+        ("leg(**{}, at=0)", 1, 5, "no parameter"),
+        ("leg(*a, at=0)", 1, 5, "without a name"),
         ("leg(at=[1, 2, 3], size=(1, 2, 3))", 1, 8, "not a number"),
         ("leg(at=(1, 2, True), size=(1, 2, 3))", 1, 15, "not a number"),
         ("leg(at=(1, 2, 3j), size=(1, 2, 3))", 1, 15, "not a number"),

@@ -377,7 +377,10 @@ WRONG = [  # the place of the mistake is behind ^, and a word of the message or 
     ("leg(^post(width=1))", "only one"),
     ("leg(^seat(cushion(edge=1)))", "only one"),
     ("box(left=1, ^left=2)", "twice"),
-    ("box(^3)", "without a keyword"),
+    ("box(^3)", "without a keyword; write width"),
+    ("def f(a):\n    box(width=a)\nf(^3)", "without a keyword; write a=..."),
+    ("leg(^cylinder(radius=1), left=3)", "write the keywords inside it: leg(cylinder(...))"),
+    ("^at(left=3)", "draws nothing itself"),
     ("leg(cylinder(^rod(radius=1)))", "keyword"),
     ("box(^edge=1)", "edge"),
     ("seat(cushion(edge=1, ^lean=3))", "lean"),
@@ -403,6 +406,8 @@ WRONG = [  # the place of the mistake is behind ^, and a word of the message or 
     ("^rod(start=at(), end=at(left=0))", "radius"),
     ("^rod(end=at(left=0), radius=1)", "start"),
     ("rod(start=at(), ^end=at(bottom=0), radius=1)", "same point"),
+    ("bent_rod(start=at(left=1), ^through=at(), end=at(right=1), radius=1)", "start and through are the same point"),
+    ("bent_rod(start=at(left=1), through=at(right=1), ^end=at(right=1), radius=1)", "through and end are the same"),
     ("rod(start=at(), end=at(top=0), radius=1, ^tilt=3)", "tilt"),
     ("^bent_rod(start=at(), end=at(top=0), radius=1)", "through"),
     ("^bar(start=at(), end=at(top=0), depth=1)", "two sizes"),
@@ -421,7 +426,7 @@ WRONG = [  # the place of the mistake is behind ^, and a word of the message or 
     ("a = ^b = 1", "two"),
     ("box(left=^thick)", "unknown name"),
     ("thick = 1\nbox(left=^thik)", "did you mean thick"),
-    ("box(left=^bottom)", "unknown name"),
+    ("box(left=^bottom)", "bottom is a word of the language, not a number"),
     ("box(left=^depth ** 2)", "number"),
     ("box(left=^None)", "number"),
     ("box(left=^'2')", "number"),
@@ -440,7 +445,7 @@ WRONG = [  # the place of the mistake is behind ^, and a word of the message or 
     ("^def seat():\n    box()", "meaning"),
     ("a = 1\n^def a():\n    box()", "meaning"),
     ("def f():\n    box()\n^def f():\n    box()", "meaning"),
-    ("def f(a=^height):\n    box(left=a)", "height"),
+    ("def f(a=^height / 2):\n    box(left=a)", "not to defaults"),
     ("def f():\n    ^f()\nf()", "calls itself"),
     ("^f()\ndef f():\n    box()", "functions stand above calls"),
     ("def f(a):\n    box(left=a)\n^f()", "needs a"),
@@ -451,6 +456,8 @@ WRONG = [  # the place of the mistake is behind ^, and a word of the message or 
     # loops and groups
     ("for _ in ^repeat(3):\n    box()", "unknown loop"),
     ("for _ in ^[1, 2]:\n    box()", "loop"),
+    ("for _ in ^inside(left=3):\n    box()", "write with inside("),
+    ("with ^divide(3, x):\n    box()", "write for _ in divide("),
     ("^for i, j in mirror(x=0):\n    box()", "one variable"),
     ("^for _ in mirror(x=0):\n    box()\nelse:\n    box()", "else"),
     ("for i in mirror(x=0):\n    box(left=^i)", "unknown name"),
@@ -505,6 +512,13 @@ def test_what_is_wrong_is_refused_at_its_place(text: str, words: str) -> None:
     ("text", "words"),
     [
         ("^seat()", "size is not declared"),
+        ("^top(height=3)", "size is not declared"),
+        ("# unit: cm\n^leg(width=5, depth=5)", "size is not declared"),
+        ("^cylinder(radius=3, height=3)", "size is not declared"),
+        ("^taper(radius=(1, 2), height=3)", "size is not declared"),
+        ("^for _ in mirror(x=0):\n    leg(width=3)", "size is not declared"),
+        ("^width, depth = 3, 4\nleg(width=5)", "is one line"),
+        ("^[width, depth, height] = 1, 2, 3\n", "without brackets"),
         ("^a = 3\n", "declare its size"),
         ("^depth = 3\nwidth, height = 4, 5\n", "one line"),
         ("^width, depth, height = 1, -2, 3\n", "depth of the whole is -2"),
@@ -531,7 +545,9 @@ def test_programs_print_and_read_back(seed: int) -> None:
     assert format_program(parse(text)) == text
 
 
-@pytest.mark.parametrize("text", ["# unit: cm\n# unit: m\n{}", "# unit: with three doors\n{}", "{}# unit: mm\n"])
+@pytest.mark.parametrize(
+    "text", ["# unit: cm\n# unit: m\n{}", "# unit: with three doors\n{}", "{}# unit: mm\n", "  # unit: cm\n{}"]
+)
 def test_comments_about_units_print_and_read_back(text: str) -> None:
     program = parse(text.format(WHOLE) + "box()")
     assert parse(format_program(program)) == program

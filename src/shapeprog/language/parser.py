@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from shapeprog.errors import did_you_mean
-from shapeprog.language.ast import Argument, Call, Fault, Group, Line, Part, Point
+from shapeprog.language.ast import Argument, Call, Fault, Function, Group, Line, Part, Point
 from shapeprog.language.cells_parser import parse_cells
 from shapeprog.language.evaluate import evaluated, placed_source
 from shapeprog.language.placement import (
@@ -36,9 +36,8 @@ from shapeprog.language.unit import METRES
 
 _IN_CELLS = {"at", "size", "by", "section"}
 _ONLY_PLACED = {"at", "inside", "divide", "row"}
-_SIDES = {word for words in AXES for word in (words.low, words.high)}
 _LIKE_UNIT = re.compile(r"[^#]*#[ \t]*units?[ \t]*[:=][ \t]*\w+[ \t]*$", re.IGNORECASE)
-_UNIT = re.compile(r"#[ \t]*unit:[ \t]*(\S+)[ \t]*")
+_UNIT = re.compile(r"[ \t]*#[ \t]*unit:[ \t]*(\S+)[ \t]*")
 
 
 def parse(text: str, name: str = "<program>") -> Program:
@@ -78,19 +77,19 @@ def parse(text: str, name: str = "<program>") -> Program:
 
 
 def _is_in_cells(tree: ast.Module) -> bool:
-    """Whether a text holds statements in cells: it has coordinates, or no size of the whole and no placed words."""
+    """Whether a text holds statements in cells: it has no size of the whole, and has coordinates or loops alone."""
     nodes = list(ast.walk(tree))
     if set(SIZES) <= {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}:
         return False
     calls = [node for node in nodes if isinstance(node, ast.Call)]
     functions = {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
     called = {node.func.id for node in calls if isinstance(node.func, ast.Name)} - functions
-    keywords = {word.arg for node in calls if getattr(node.func, "id", "") not in functions for word in node.keywords}
-    known = {word for word in called if word in language() and not is_reserved(word)}
-    if keywords & _IN_CELLS or known or not tree.body:
+    keywords = [word for node in calls if getattr(node.func, "id", "") not in functions for word in node.keywords]
+    if any(word.arg in _IN_CELLS or (isinstance(word.value, ast.Tuple) and word.arg != "radius") for word in keywords):
         return True
-    is_placed = called & _ONLY_PLACED or keywords & _SIDES
-    return not is_placed and any(node.args or node.keywords for node in calls)
+    if not tree.body or any(word in language() and not is_reserved(word) for word in called):
+        return True
+    return bool(called) and not called & _ONLY_PLACED and not any(isinstance(node, ast.Expr) for node in nodes)
 
 
 def _unit(text: Text, tree: ast.Module) -> tuple[str, Sequence[str]]:
@@ -125,6 +124,7 @@ class _Reader(Reader):
         if kind not in kinds:
             what = "group" if kinds == ["inside"] else "loop"
             hint = did_you_mean(kind, kinds, f"use {' or '.join(kinds)}")
+            hint = f"write {GROUPS[kind].example}" if kind in GROUPS else hint
             hint = "write row(3, last=at(...)) or translate(3, x=...)" if kind == "range" else hint
             raise self.error(call, f"unknown {what} {kind or self.text.shown(call)!r}", hint)
         assert isinstance(call, ast.Call)
@@ -163,8 +163,8 @@ class _Reader(Reader):
             return self.element(inner, scope, word)
         words = {keyword.arg or "" for keyword in call.keywords}
         function, kind = self.functions.get(word), self._solid(call, word, role, words)
-        first = call.args[0] if call.args else call
-        self.require(not call.args, first, "a number without a keyword", "write width=...")
+        if call.args:
+            self._refuse(call.args[0], word, function)
         needed: Sequence[str]
         if function and not kind:
             self.function_names[word].used = True
@@ -190,6 +190,14 @@ class _Reader(Reader):
         role = role or (word if word in language().roles else "")
         return self.recorded(Part(kind, pairs, role, note), call, places)
 
+    def _refuse(self, argument: ast.expr, word: str, function: Function | None) -> None:
+        """Refuse an argument without a keyword."""
+        if isinstance(argument, ast.Call) and word in language().roles:
+            message, cure = f"{word} takes one solid and nothing else", "write the keywords inside it"
+            raise self.error(argument, message, f"{cure}: {word}({self.text.shown(argument.func)}(...))")
+        parameters = [name for name, _ in function.parameters] if function else []
+        raise self.error(argument, "a number without a keyword", f"write {[*parameters, 'width'][0]}=...")
+
     def _solid(self, call: ast.Call, word: str, role: str, words: set[str]) -> str:
         """The solid that a call draws: the one that it names, or a box for a role alone; empty for a function."""
         roles = language().roles
@@ -202,8 +210,13 @@ class _Reader(Reader):
             return "box"
         message = f"{word} is a role, and a part has only one"
         self.require(word not in roles, call, message, "write the solid inside it")
-        if word in GROUPS:
-            raise self.error(call, f"{word} draws nothing itself", f"write {GROUPS[word].example}")
+        if word in GROUPS or word == "at":
+            hint = (
+                f"write {GROUPS[word].example}"
+                if word in GROUPS
+                else "a point belongs to a solid: rod(start=at(...), ...)"
+            )
+            raise self.error(call, f"{word} draws nothing itself", hint)
         if word in self.function_names and word not in self.functions:
             raise self.error(call, f"{word} calls itself", "use a loop: functions call only those above them")
         if word not in self.functions:

@@ -78,7 +78,7 @@ GROUPS = {
 }
 
 RESERVED = frozenset([*BOX, *IN_BOX, *BETWEEN, *GROUPS, *POINTS, "at"])
-"""Words that are never names, beside roles and statements."""
+"""Words that are never names, beside roles."""
 
 BOX_IN_CELLS = ("bottom", "front", "left", "height", "depth", "width")
 """Parameters in cells that are the box of a function: its low corner along up, depth and left, and its extents."""

@@ -142,11 +142,12 @@ class Reader(ABC):
         message = f"{len(targets)} names for {len(values)} numbers"
         self.require(len(targets) == len(values), node, message, "write as many numbers as names")
         words = [getattr(name, "id", "") for name in targets]
+        for name, word in zip(targets, words, strict=True):
+            self.require(word, name, f"{self.text.shown(name)} is not a name", "write name = number, without brackets")
         pairs = [(word, self.value(word, number, scope)) for word, number in zip(words, values, strict=True)]
         self.declares_whole = not local and not self.has_whole and set(SIZES) <= set(words)
         self.has_whole = self.has_whole or self.declares_whole
         for name, word in zip(targets, words, strict=True):
-            self.require(word, name, f"{self.text.shown(name)} is not a name", "write name = number")
             self.declare(word, name, scope)
         places: dict[str, Node] = dict(zip(words, targets, strict=True))
         return self.recorded(Assignment(tuple(pairs), self.note(node)), node, places)
@@ -225,6 +226,10 @@ class Reader(ABC):
             if name.name not in scope:
                 otherwise = f"declare it above: {name.name} = ..."
                 hint = did_you_mean(name.name, scope, otherwise) if scope else otherwise
+                if is_reserved(name.name):
+                    hint = f"{name.name} is a word of the language, not a number"
+                if name.name in SIZES:
+                    hint = f"{name.name} is known below its line, but not to defaults of parameters"
                 raise self.error(self.expressions[id(name)], f"unknown name {name.name!r}", hint)
             scope[name.name].used = True
 

@@ -39,12 +39,12 @@ def manual(name: str | None = None) -> str:
         return "\n".join(line for part in parts for line in (*part, ""))
     pages = [_placed_page(name)] if name in _SOLIDS or name in GROUPS else []
     pages += [f"{name}=_\n\n  {_DOCS[name].capitalize()}.\n"] if name in _DOCS and not pages else []
-    pages += [_PROGRAM[_PROGRAM.index("Keywords") :] + "\n"] if name in BOX else []
+    pages += [_PROGRAM[_PROGRAM.index("Keywords") :] + "\n"] if name in (*BOX, "at") else []
     pages += [_role_page(registry.roles[name])] if name in registry.roles else []
     pages += [page(registry[name])] if name in registry else []
     if not pages:
         raise ShapeProgError(
-            f"unknown word {name!r}", did_you_mean(name, [*_DOCS, *BOX, *registry.names, *registry.roles])
+            f"unknown word {name!r}", did_you_mean(name, [*_DOCS, *BOX, "at", *registry.names, *registry.roles])
         )
     return "\n".join(pages)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from textwrap import dedent
 
@@ -13,6 +14,7 @@ from commands import Run
 from shapeprog import inference
 from shapeprog.data.synthetic.furniture import furniture
 from shapeprog.errors import InputError, OutputError
+from shapeprog.formats.files import load
 from shapeprog.language.ast import Call, Source
 from shapeprog.language.convert import placed
 from shapeprog.language.dimensions import in_unit
@@ -24,7 +26,7 @@ from shapeprog.language.printer import format_program, source_of
 from shapeprog.language.program import Draw, Loop, Program
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import unroll
-from shapeprog.library import Library, learn, library_of, load_library, save_library, with_library
+from shapeprog.library import Library, joined, learn, library_of, load_library, save_library, with_library
 from shapeprog.library.blocks import Kind, blocks_of
 from shapeprog.library.groups import PARAMETERS
 from shapeprog.library.length import statements
@@ -170,6 +172,23 @@ def test_parts_of_another_role_and_those_that_are_off_are_left_alone() -> None:
         assert with_library(program, library(SHELVES)) == program
 
 
+def test_several_libraries_are_one_in_which_the_first_of_a_name_counts() -> None:
+    program = parse(TABLE + "for _ in row(3, last=at(top=2)):\n    shelf(width=9, bottom=1, height=0.5)\n")
+    both = joined([library(POSTS), Library(Source()), library(SHELVES)])
+    assert {call.name for call in calls(with_library(program, both))} == {"posts", "shelves"}
+    others = library("def posts():\n    box(height=1)\ndef four():\n    posts()\ndef five():\n    box(width=1)\n")
+    assert [function.name for function in joined([both, others]).functions] == ["posts", "shelves", "five"]
+    assert joined([both, others]).source.functions["posts"] == both.source.functions["posts"]
+
+
+def test_a_default_may_be_larger_than_the_box_that_is_tried_first() -> None:
+    handle = "handle(left={0}, right={0}, front=-1, depth=1, z=0, height=1)"
+    whole, inside = "width, depth, height = 24, 24, 24", "with inside(front=0, depth=1, top=0, height=8)"
+    text = f"{whole}\n{inside}:\n    drawer()\n    {handle.format(10)}\n"
+    front = library(f"def pull(inset=10):\n    drawer()\n    {handle.format('inset')}\n")
+    assert [call.name for call in calls(with_library(parse(text), front))] == ["pull"]
+
+
 def test_words_that_a_program_has_already_are_not_taken_for_functions() -> None:
     program = parse(TABLE.replace("thick", "posts"))
     assert with_library(program, library(POSTS)) == program
@@ -208,14 +227,16 @@ def test_the_same_programs_give_the_same_library_and_it_comes_back_from_its_file
     programs = [furniture(number) for number in range(6)]
     found = learn(programs)
     assert found.functions
-    assert learn(programs) == found
+    assert learn(program for program in programs) == found
     assert load_library(save_library(found, tmp_path / "a.shape")) == found
     with pytest.raises(OutputError, match="no place for a library"):
         save_library(found, tmp_path / "a.json")
 
 
-def test_programs_that_share_nothing_give_an_empty_library() -> None:
+def test_programs_that_share_nothing_give_an_empty_library(tmp_path: Path) -> None:
     assert learn([]).functions == ()
+    with pytest.raises(OutputError, match="holds no functions"):
+        save_library(learn([]), tmp_path / "a.shape")
     alone = [parse("leg(at=(0, 0, 0), size=(8, 1, 1))"), parse("seat(box(at=(0, 0, 0), size=(1, 9, 9)))"), planted(1)]
     assert learn(alone).functions == ()
     assert with_library(alone[2], learn(alone)) == alone[2]
@@ -277,6 +298,14 @@ def test_a_program_in_a_unit_is_written_with_a_library_and_stays_in_it() -> None
     assert with_library(program, library(SHELVES)) is program
     mixed = parse("# unit: cm\n" + TABLE + "box(tilt=thick)\n")
     assert with_library(mixed, library(POSTS)) is mixed
+
+
+def test_numbers_in_a_unit_stay_round() -> None:
+    chair = load(Path(__file__).parents[1] / "examples/pieces/chair.shape")
+    written = with_library(chair, load_library())
+    kept = {each.name: each.value for each in names(written)}
+    assert {"slats": 4} | kept == {each.name: each.value for each in names(chair)}
+    assert not re.search(r"\d\.\d{4}", format_program(written))
 
 
 def test_a_library_is_in_no_unit() -> None:

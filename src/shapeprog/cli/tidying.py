@@ -38,7 +38,7 @@ def tidy_command(
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.ast import Function
     from shapeprog.language.free import numbers
-    from shapeprog.library import with_library
+    from shapeprog.library import joined, with_library
 
     terminal.check_units(unit, file_unit, needed=True)
     libraries = terminal.load_libraries(modules, library)
@@ -51,8 +51,8 @@ def tidy_command(
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
     wanted = terminal.asked_unit(given.unit, frame, program, unit, file_unit)
     result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
-    for each in libraries:
-        result = with_library(result, each)
+    if libraries:
+        result = with_library(result, joined(libraries))
     result = in_readable_unit(result, wanted)
     if out is not None:
         save(result, out, frame)

@@ -41,7 +41,7 @@ from shapeprog.language.merging import merged
 from shapeprog.language.program import Program
 from shapeprog.language.unit import metres
 from shapeprog.language.unroll import unroll
-from shapeprog.library import Library, with_library
+from shapeprog.library import Library, joined, with_library
 
 SEARCH_SHARE = 0.65
 """Share of the time budget after which the search on cells hands over to fitting."""
@@ -186,7 +186,7 @@ def infer(
             program = named_anew(program)
         held: frozenset[int] = frozenset()
         if libraries:
-            program, held = with_calls(program, libraries, coverage)
+            program, held = with_calls(program, [joined(libraries)], coverage)
         if ties:
             program = tie(program, evidence, floor=floor, held=held, progress=progress)
         if integral is not None and description_length(plain, target.voxels, integral) < description_length(
@@ -195,8 +195,8 @@ def infer(
             program, snapped = plain, integral
     if snapped is None:
         program = placed_if_possible(merged(program), floor)
-        for library in libraries:
-            program = with_library(program, library)
+        if libraries:
+            program = with_library(program, joined(libraries))
     program = in_readable_unit(program, unit_of_result(target, program, unit))
     reason = " ".join(filter(None, (reason, doubt_of_furniture(evidence), target.note)))
     cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)

@@ -39,6 +39,7 @@ from shapeprog.language.unit import METRES, Unit
 from shapeprog.space import SPAN
 
 DIGITS = 6  # digits of a length that is converted: float32 has two more, which would show that it was
+ALL_DIGITS = 9  # those of float32, for lengths that are converted back
 FINEST = 1e-5  # metres to which lengths are rounded that a person has written, and the least digits that they keep
 FINEST_SHARE = 1e-4  # of the longest side, to which they are rounded at most
 LEAST_DIGITS = 3
@@ -116,11 +117,11 @@ def _scoped_uses(lines: Iterable[Line], scope: Scope) -> Iterator[tuple[Use, Sco
         yield from _scoped_uses(body_of(line), _inside(line, scope))
 
 
-def in_unit(program: Program, unit: Unit | None, workshop: bool = False) -> Program:
+def in_unit(program: Program, unit: Unit | None, workshop: bool = False, digits: int = DIGITS) -> Program:
     """The same placed program with its lengths in a unit, or in cells; unchanged if it is in this unit.
 
-    Lengths keep six digits; for a ``workshop`` they are rounded to .01 mm or .001 in, and where the object is small to
-    at most a 10,000th of its longest side, so that its parts stay together.
+    Lengths keep so many ``digits``, by default six; for a ``workshop`` they are rounded to .01 mm or .001 in, and where
+    the object is small to at most a 10,000th of its longest side, so that its parts stay together.
 
     Raises
     ------
@@ -143,7 +144,7 @@ def in_unit(program: Program, unit: Unit | None, workshop: bool = False) -> Prog
         if workshop and power == 1 and unit.name:
             least = LEAST_DIGITS - 1 - math.floor(math.log10(abs(result)))
             return to_float32(round(result, max(least, decimals)))
-        return to_float32(float(f"{result:.{DIGITS}g}"))
+        return to_float32(float(f"{result:.{digits}g}"))
 
     return _scaled(Source(_Powers(source).changed(source.lines, change), unit), source)
 

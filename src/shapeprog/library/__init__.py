@@ -2,6 +2,6 @@
 
 from shapeprog.library.learning import learn
 from shapeprog.library.rewriting import with_library
-from shapeprog.library.store import Library, library_of, load_library, save_library
+from shapeprog.library.store import Library, joined, library_of, load_library, save_library
 
-__all__ = ["Library", "learn", "library_of", "load_library", "save_library", "with_library"]
+__all__ = ["Library", "joined", "learn", "library_of", "load_library", "save_library", "with_library"]

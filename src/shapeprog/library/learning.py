@@ -8,7 +8,7 @@ that shortens the programs most becomes a function.  Its blocks are removed from
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,11 +46,12 @@ class Learned(NamedTuple):
     example: Call
 
 
-def learn(given: Sequence[Program], most: int = MOST) -> Library:
+def learn(given: Iterable[Program], most: int = MOST) -> Library:
     """The library of the functions that shorten programs most; empty if none does.  The same for the same programs.
 
     Comments show how often the programs use each function, and a typical call.
     """
+    given = list(given)
     results = list(_functions([in_cells(program) for program in given], most))
     if not results:
         return Library(Source())

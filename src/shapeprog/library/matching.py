@@ -34,7 +34,7 @@ TOLERANCE = 0.05
 """Largest difference in cells between a number of a program and that of a call that replaces it."""
 
 BOX = 12.0
-"""Sides of the box of a call without an example; they decide the order of parts along each axis."""
+"""Least sides of the box of a call without an example; they decide the order of parts along each axis."""
 
 GENERIC = 7.0
 """Value of a parameter without an example."""
@@ -170,7 +170,9 @@ class Pattern:
         counts = {name: numbers[name] for name in self.counts}
         key = tuple(counts.values())
         if key not in self._nodes:
-            usual = {name: BOX if name in BOX_IN_CELLS else 1.0 for name in self.parameters} | self._shown | counts
+            shown = self._shown
+            side = max([BOX, *(4 * abs(value) for value in shown.values())])  # in which large defaults fit
+            usual = {name: side if name in BOX_IN_CELLS else 1.0 for name in self.parameters} | shown | counts
             self._nodes[key] = call_in_cells(self.source, self.function.name, usual)
         return self._nodes[key]
 
@@ -343,4 +345,5 @@ class Matcher:
     def _sum(self, row: FloatArray) -> Value:
         """The expression of a row (N + 1,): factors of the names, and a constant."""
         factors = tuple(zip(self.numbers, np.round(row[:-1], 5).tolist(), strict=True))
-        return Linear(round(float(row[-1]), 4) + 0.0, factors).written()
+        constant = float(row[-1])
+        return Linear(round(constant, 7) if abs(constant) >= 5e-5 else 0.0, factors).written()

@@ -37,8 +37,10 @@ def with_library(program: Program, library: Library) -> Program:
     """The same program with calls of functions of a library where these are shorter; unchanged if none is.
 
     It draws the same within ``TOLERANCE`` cells.  The result contains the functions that it calls, below its
-    assignments.  Arguments are expressions of its names, which keeps ties.  Its lengths stay in their unit.  A program
-    with statements that have no placed form does not change, nor does one whose numbers are not linear in its names.
+    assignments.  Arguments are expressions of its names for lengths; counts become numbers.  Comments are left out,
+    groups and functions of its own written out, as are calls of another library: use ``joined`` libraries.  Its lengths
+    stay in their unit.  A program with statements that have no placed form does not change, nor does one whose numbers
+    are not linear in its names.
     """
     try:
         original = placed(program)

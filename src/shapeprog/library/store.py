@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.files import load
-from shapeprog.language.ast import Assignment, Call, Comment, Function, Source
+from shapeprog.language.ast import Assignment, Call, Comment, Function, Line, Source
 from shapeprog.language.parser import parse
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import format_source, source_of
@@ -102,15 +103,42 @@ def library_of(program: Program, name: str = "<library>") -> Library:
         raise InputError(f"{name} is not a library: it has {what}", "a library holds only functions")
     if source.unit is not None and source.unit.name:
         message = f"{name} is not a library: its lengths are in {source.unit.name} of one object"
-        raise InputError(message, "leave out the line '# unit:'; programs may be in any unit")
+        raise InputError(
+            message, "leave out the line '# unit:'; lengths of a library are in cells (24 = the longest side)"
+        )
     if not source.functions:
         raise InputError(f"{name} holds no functions", "write def name(parameter, ...): with what it draws below")
     return Library(source)
 
 
+def joined(libraries: Iterable[Library]) -> Library:
+    """The functions of several libraries as one.
+
+    Of several with one name the first counts; functions that call another of this name are left out.
+    """
+    result = Source()
+    for library in libraries:
+        dropped: set[str] = set()
+        lines: list[Line] = []
+        for line in library.source.lines:
+            if isinstance(line, Function):
+                called = {inner.name for inner in Source(line.body).walk() if isinstance(inner, Call)}
+                if line.name in result.functions or called & dropped:
+                    dropped.add(line.name)
+                    continue
+            if not (result.lines and isinstance(line, Assignment)):  # they declare the size of a whole, once
+                lines.append(line)
+        result = replace(library.source, lines=(*result.lines, *lines))
+    return Library(result)
+
+
 def save_library(library: Library, path: str | os.PathLike[str]) -> Path:
     """Write a library as program text, and return the path."""
     file = Path(path)
+    if not library.functions:
+        raise OutputError(
+            f"the library for {file} holds no functions", "learn it from more programs, with similar parts"
+        )
     if file.suffix.lower() != ".shape":
         raise OutputError(f"{file} is no place for a library", "let its name end in .shape")
     write_text(file, format_source(library.source))

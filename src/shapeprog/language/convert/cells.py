@@ -10,7 +10,7 @@ import numpy as np
 
 from shapeprog.language.ast import Assignment, Call, Draw, Loop, Scale, Source, assignments, used_names
 from shapeprog.language.convert.forms import EVEN
-from shapeprog.language.dimensions import counted_names, in_unit
+from shapeprog.language.dimensions import ALL_DIGITS, counted_names, in_unit
 from shapeprog.language.evaluate import symbolic
 from shapeprog.language.expression import Expression, Linear, Name
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
@@ -31,7 +31,7 @@ def named_cells(program: Program) -> Source:
     ShapeProgError
         If its numbers are not linear in the names of plain numbers, or a name is a length in one place only.
     """
-    source = source_of(in_unit(program, None))
+    source = source_of(in_unit(program, None, digits=ALL_DIGITS))
     numbers = source.evaluated_numbers()
     names = {name: Linear.of(name) for name, value in source.numbers.items() if not isinstance(value, Expression)}
     nodes = symbolic(source, names, (source.evaluated_numbers(names)["height"] / -2.0, 0.0))

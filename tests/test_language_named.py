@@ -103,6 +103,21 @@ def test_names_of_placed_text_are_whole_where_they_count() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "whole"),
+    [
+        ("n = 2\nfor _ in row(n + 1, last=at(top=2)):\n    shelf(height=3)\n", ["n"]),
+        ("n = 2\nm = 2 * n\nfor _ in row(m, last=at(top=2)):\n    shelf(height=3)\n", ["n", "m"]),
+        ("n = 2\nfor _ in row(n + 1, last=at(top=2)):\n    shelf(height=n)\n", []),
+        ("n = 2\nfor _ in row(width / n, last=at(top=2)):\n    shelf(height=3)\n", []),
+    ],
+)
+def test_names_in_sums_and_products_of_counts_alone_are_whole(text: str, whole: list[str]) -> None:
+    program = parse("width, depth, height = 24, 24, 24\n" + text)
+    assert [each.name for each in sp.names(program) if each.whole] == whole
+    assert ("n" in sp.Parametric(program).names) == (not whole)
+
+
+@pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"corner": 3}, "no name 'corner'"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 import torch
 from hypothesis import given
@@ -136,6 +138,14 @@ def test_a_number_that_follows_from_a_length_keeps_its_value() -> None:
     there = in_unit(program, Unit("cm", 4))
     close(there, program, 1e-6)
     assert format_program(there).splitlines()[3] == "box(width=a * a / 40, depth=a, height=36, tilt=0.5 * a)"
+
+
+def test_a_chain_of_names_takes_linear_time() -> None:
+    chain = "".join(f"a{index} = a{index - 1} + 0.001\n" for index in range(1, 1000))
+    program = parse(f"{WHOLE}a0 = 1\n{chain}box(left=a999)\n")
+    started = time.process_time()
+    close(in_unit(program, Unit("cm", 4)), program, 1e-6)
+    assert time.process_time() - started < 2
 
 
 def test_a_comment_that_reads_like_a_unit_is_not_written() -> None:

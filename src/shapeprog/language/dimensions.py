@@ -29,7 +29,7 @@ from shapeprog.language.ast import (
     with_values,
 )
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.expression import Binary, Expression, Name, Negative, Value
+from shapeprog.language.expression import Binary, Expression, Name, Negative, Value, names_in, text_of
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import BOX, SIZES
 from shapeprog.language.printer import source_of
@@ -91,16 +91,18 @@ def _keywords(keywords: Keywords) -> Iterator[Use]:
 
 
 def counted_names(source: Source) -> set[str]:
-    """Names that stand for a count, turn or axis of a loop, or are passed on to one; parameters of functions and names
-    in them are ``function.name``."""
-    names = [
-        (use, scope(use.value.name)) for use, scope in _scoped_uses(source.lines, str) if isinstance(use.value, Name)
-    ]
+    """Names that stand for a count, turn or axis of a loop, or are passed on to one, and those that occur in sums and
+    products of such alone; parameters of functions and names in them are ``function.name``."""
+    used = [(use, {scope(name) for name in names_in(use.value)}) for use, scope in _scoped_uses(source.lines, str)]
     result: set[str] = set()
     size = -1
     while size < len(result):
         size = len(result)
-        result |= {name for use, name in names if is_count(use, result)}
+        others = {*SIZES}.union(
+            *(names for use, names in used if not is_count(use, result) or "/" in text_of(use.value))
+        )
+        counts = ((use.value, names) for use, names in used if is_count(use, result))
+        result |= {name for value, names in counts for name in names if isinstance(value, Name) or name not in others}
     return result
 
 
@@ -208,10 +210,10 @@ class _Powers:
     def __init__(self, source: Source) -> None:
         self._known = dict.fromkeys(SIZES, 1.0)
         for self._plain in (False, True):
-            learned = -1
+            lines, learned = source.lines, -1
             while learned < len(self._known):
-                learned = len(self._known)
-                self.changed(source.lines, lambda number, _: number)
+                learned, lines = len(self._known), lines[::-1]  # along a chain of names each way once
+                self.changed(lines, lambda number, _: number)
 
     def of(self, name: str) -> float:
         """The power of a name; none if it may have any."""

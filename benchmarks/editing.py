@@ -18,8 +18,9 @@ not have them to begin with.
 from __future__ import annotations
 
 from collections.abc import Set
+from dataclasses import replace
 from functools import cache
-from itertools import product
+from itertools import count, product
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +31,13 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.mesh import manifold, part_meshes, pieces, union_mesh
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.language.free import free_numbers, multiplied
+from shapeprog.language.ast import Function, Line, changed_lines, with_values
+from shapeprog.language.dimensions import counted_names, is_count, uses
+from shapeprog.language.evaluate import evaluated
+from shapeprog.language.free import free_numbers, mapped
 from shapeprog.language.named import names, set
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import SIDE
@@ -61,6 +67,27 @@ class EditScores(NamedTuple):
     one_piece: float
     free: int
     names: float
+
+
+def multiplied(program: Program, place: int, factor: float) -> Program:
+    """The program with one of its free numbers multiplied; ``place`` counts them from 0.
+
+    A ``ShapeProgError`` if that is no program, as when an expression then divides by zero.
+    """
+    source, counter = source_of(program), count()
+    counted = counted_names(source)
+
+    def change(number: float) -> float:
+        return to_float32(number * factor) if next(counter) == place else number
+
+    def changed(line: Line) -> Line:
+        if isinstance(line, Function):
+            return line
+        return with_values(
+            line, [use.value if is_count(use, counted) else mapped(use.value, change) for use in uses(line)]
+        )
+
+    return evaluated(replace(source, lines=changed_lines(source.lines, changed)))
 
 
 def edit_scores(program: Program) -> EditScores:

@@ -81,7 +81,8 @@ def columns_of(mesh: str, changes: tuple[str, ...]) -> list[Column]:
 
 def without_names(plain: Any, before: Any, value: float) -> tuple[str, Any]:
     """What is changed in a plain program where a named number gets another value, and the program that this makes."""
-    from shapeprog.language.free import free_values, multiplied
+    from benchmarks.editing import multiplied
+    from shapeprog.language.free import free_values
 
     numbers = np.array(free_values(plain))
     place = int(np.abs(numbers - before.value).round(3).argmin())

@@ -263,7 +263,8 @@ def plain_slopes(program: Any) -> Any:
 
 def slopes(program: Any, planted: Any) -> Any:
     """The same of the features of a planted program by the free numbers of the program that stands for it."""
-    from shapeprog.language.free import free_values, multiplied
+    from benchmarks.editing import multiplied
+    from shapeprog.language.free import free_values
     from shapeprog.language.unroll import unroll
 
     of = unroll(planted)
@@ -504,7 +505,8 @@ def boxes_of(pack: Path, number: int) -> tuple[list[Any], Any]:
 def shaken(program: Any) -> tuple[int, Any]:
     """The number of free numbers; and the sizes of the boxes of all primitives (K, N, 3), smallest first, as they are
     and where all free numbers are others."""
-    from shapeprog.language.free import free_numbers, multiplied
+    from benchmarks.editing import multiplied
+    from shapeprog.language.free import free_numbers
     from shapeprog.language.unroll import unroll
 
     free = free_numbers(program)

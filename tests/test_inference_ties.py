@@ -13,7 +13,7 @@ import torch
 from typer.testing import CliRunner
 
 import shapeprog as sp
-from benchmarks.editing import edit_scores
+from benchmarks.editing import edit_scores, multiplied
 from shapeprog.cli.app import app
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.fit.joints import find_joints
@@ -33,7 +33,7 @@ from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import names_in
-from shapeprog.language.free import free_numbers, free_values, multiplied, numbers
+from shapeprog.language.free import free_numbers, free_values, numbers
 from shapeprog.language.merging import merged
 from shapeprog.language.placement import SIZES
 from shapeprog.language.printer import format_program, source_of

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from placed import placed_text
 
 import shapeprog as sp
+from benchmarks.editing import multiplied
 from shapeprog.language import Program, evaluated
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.dimensions import in_unit, lengths
 from shapeprog.language.evaluate import placed_source
-from shapeprog.language.free import free_numbers, multiplied
+from shapeprog.language.free import free_numbers
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.unit import METRES, Unit

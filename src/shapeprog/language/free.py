@@ -9,13 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import count
 
-from shapeprog.language.ast import Function, Line, Source, changed_lines, with_values
+from shapeprog.language.ast import Function, Source
 from shapeprog.language.dimensions import counted_names, is_count, uses
-from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Binary, Expression, Negative, Value
-from shapeprog.language.parameters import to_float32
 from shapeprog.language.printer import numbers_written, source_of
 from shapeprog.language.program import Program
 
@@ -53,37 +50,16 @@ def free_values(program: Program, functions: bool = True) -> list[float]:
     for line in Source(tuple(line for line in source.lines if functions or not isinstance(line, Function))).walk():
         for use in () if isinstance(line, Function) else uses(line):
             if not is_count(use, counted):
-                _mapped(use.value, noted)
+                mapped(use.value, noted)
     return result
 
 
-def multiplied(program: Program, place: int, factor: float) -> Program:
-    """The program with one of its free numbers multiplied; ``place`` counts them from 0.
-
-    A ``ShapeProgError`` if that is no program, as when an expression then divides by zero.
-    """
-    source, counter = source_of(program), count()
-    counted = counted_names(source)
-
-    def change(number: float) -> float:
-        return to_float32(number * factor) if next(counter) == place else number
-
-    def changed(line: Line) -> Line:
-        if isinstance(line, Function):
-            return line
-        return with_values(
-            line, [use.value if is_count(use, counted) else _mapped(use.value, change) for use in uses(line)]
-        )
-
-    return evaluated(replace(source, lines=changed_lines(source.lines, changed)))
-
-
-def _mapped(value: Value, change: Callable[[float], float]) -> Value:
+def mapped(value: Value, change: Callable[[float], float]) -> Value:
     """The value with a change made to its free numbers, from left to right: a plain number, or the terms of a sum."""
     if not isinstance(value, Expression):
         return change(value) if value else value
     if isinstance(value, Negative):
-        of = _mapped(value.of, change)
+        of = mapped(value.of, change)
         assert isinstance(of, Expression)
         return replace(value, of=of)
     if not isinstance(value, Binary):
@@ -91,7 +67,7 @@ def _mapped(value: Value, change: Callable[[float], float]) -> Value:
     adds = value.operator in ("+", "-")
     first, second = value.left, value.right
     if adds or isinstance(first, Expression):
-        first = _mapped(first, change)
+        first = mapped(first, change)
     if adds or (value.operator == "*" and isinstance(second, Expression)):
-        second = _mapped(second, change)
+        second = mapped(second, change)
     return replace(value, left=first, right=second)

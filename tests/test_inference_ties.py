@@ -371,6 +371,25 @@ for i in translate(6, by=(0, 0, 1.23)):
     assert unroll(program).distance(points).abs().max() < 1
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "width, depth, height = 80, 30, 200\nshelf(bottom=150, height=2)\nbox(left=9, width=2, bottom=9, height=10)\n",
+        "# unit: cm\nwidth, depth, height = 10, 10, 12  # a stool\n\nleg(width=2)\n",
+        "width, depth, height = 30, 10, 20\ntop(left=-5, right=-5, top=0, height=2)\nleg(top=2, width=9)\n",
+    ],
+)
+def test_tidy_keeps_the_declared_whole_and_tells_of_comments(tmp_path: Path, text: str):
+    (tmp_path / "given.shape").write_text(text)
+    ended = CliRunner().invoke(app, ["tidy", str(tmp_path / "given.shape"), str(tmp_path / "out.shape")])
+    one, two = (sp.load(tmp_path / name) for name in ("given.shape", "out.shape"))
+    before, after = (source_of(program).evaluated_numbers() for program in (one, two))
+    assert [before[size] for size in SIZES] == [after[size] for size in SIZES]
+    assert source_of(one).scale == source_of(two).scale
+    torch.testing.assert_close(unroll(one).centre, unroll(two).centre, atol=0.02, rtol=0)
+    assert ("comments are left out" in ended.stderr) == ("stool" in text)
+
+
 def test_tidy_writes_equal_loops_once(tmp_path: Path):
     (tmp_path / "table.shape").write_text(TABLE)
     found = CliRunner().invoke(app, ["tidy", str(tmp_path / "table.shape")]).output

@@ -255,7 +255,10 @@ def asked_unit(
         return own.to(unit)
     if frame is None:
         message = f"cannot write {path} in {unit}: the size of its cells is unknown"
-        raise InputError(message, "infer it with --unit, or name its unit at the top, as in '# unit: cm'")
+        cure = f"statements in cells have no size: infer the object with --unit {unit}"
+        raise InputError(
+            message, "infer it with --unit, or name its unit at the top, as in '# unit: cm'" if own else cure
+        )
     return Unit.of(frame, unit, file_unit or "")
 
 

@@ -30,7 +30,8 @@ def tidy_command(
     Example: shapeprog tidy old.shape new.shape
 
     Nearly equal lengths become equal, nearly flush or touching faces flush or touching, nearly centred parts centred.
-    The remaining numbers get names; changing one moves every part that depends on it.
+    The remaining numbers get names; changing one moves every part that depends on it. The size of the whole stays;
+    comments and earlier names are left out. Programs with groups or functions are refused.
     """
     from shapeprog.formats import save
     from shapeprog.inference.readable import in_readable_unit
@@ -49,6 +50,8 @@ def tidy_command(
     if any(isinstance(line, Function) or getattr(line, "kind", "") in ("inside", "divide") for line in lines):
         cure = "tidy is for programs of plain numbers; edit this one by hand"
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
+    if any(getattr(line, "text", "") or getattr(line, "note", "") for line in lines):  # a comment, or a line with one
+        terminal.warn(program, "its comments are left out")
     wanted = terminal.asked_unit(given.unit, frame, program, unit, file_unit)
     result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
     if libraries:

@@ -36,7 +36,6 @@ MOST_SLOTS = 16  # tensors are as wide as the statements at hand need, up to her
 EMPTY, END = 0, 21  # ids without a statement: nothing, and the end of a loop in flat listings
 ROLES = 127  # ids of roles that are no statements lie above
 
-
 Hint = Callable[[Box], Iterable[Sequence[float]]]
 
 
@@ -234,9 +233,7 @@ class Language:
     def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
         """The mistakes in a declaration, found without drawing it, each with its cure."""
         what = f"statement {declared.name!r}"
-        owners = dict.fromkeys((EMPTY, END), "the language itself") | {
-            declaration.id: declaration.name for declaration in self
-        }
+        owners = dict.fromkeys((EMPTY, END), "the language itself") | {known.id: known.name for known in self}
         owners = {role.id: f"the role {role.name}" for role in self.roles.values()} | owners
         if not is_word(declared.name):
             yield f"{declared.name!r} is not a Python identifier", WORDS
@@ -262,7 +259,7 @@ class Language:
                 yield f"{what} has the paper's name {declared.paper}, which belongs to {twin.name}", cure
 
     def forget(self, name: str) -> None:
-        """Take a declaration out again, as when the module that made it fails."""
+        """Take a declaration out again."""
         del self._by_id[self._by_name.pop(name).id]
 
     def free_id(self) -> int:
@@ -324,7 +321,7 @@ def statement(
 ) -> Callable[[Callable[..., Any]], Statement]:
     """Declare a drawing statement from a function of annotated parameters that returns its solids.
 
-    Without ``doc`` the manual shows the first paragraph of the function's docstring.
+    Without ``doc`` the manual shows the first paragraph of the function's docstring; see :class:`Statement` for the rest.
     """
     fields = {"pivot": pivot, "quarter": quarter, "paper": paper, "taught": taught, "hint": hint}
     return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, **fields)
@@ -395,8 +392,8 @@ def _try(declared: Statement) -> None:
         hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions or none"
         raise DeclarationError(message, hint) from cause
     if not parts or any(shape not in (None, right) for shape, (_, right) in zip(shapes, parts, strict=True)):
-        message = f"{what} of shapes {shapes}"
-        raise DeclarationError(message, f"{requirement} with the leading dimensions of the parameters")
+        requirement += " with the leading dimensions of the parameters"
+        raise DeclarationError(f"{what} of shapes {shapes}", requirement)
     if any(count != declared.size for count in starts):
         message = f"the hint of statement {declared.name!r} yields {starts[0]} numbers"
         raise DeclarationError(message, f"yield {declared.size}, one for each number of its parameters")

@@ -56,7 +56,8 @@ def tie(
     Parameters
     ----------
     program
-        A program of statements in cells, or a placed one; only the numbers that it evaluates to are read.
+        A program of statements in cells, or a placed one; only the numbers that it evaluates to are read, and the whole
+        of a placed one that somebody wrote.
     evidence
         The target, which limits how far relations may move its parts.
     price
@@ -73,7 +74,13 @@ def tie(
         return program
     with one_tensor_thread(kernels=1):
         try:
-            tied = placed(plain if held else merged(plain), merge=not held, rows=False, floor=floor)
+            tied = placed(
+                plain if held else merged(plain),
+                merge=not held,
+                rows=False,
+                floor=floor,
+                whole=program.source if known else None,
+            )
         except ShapeProgError:  # a statement without a placed form
             return program
         assert tied.source is not None

@@ -41,7 +41,9 @@ EMPTY = 0.1
 """Share of the height that may be empty below the parts, as the feet that no part stands for."""
 
 
-def placed(program: Program, *, merge: bool = True, rows: bool = True, floor: float | None = None) -> Program:
+def placed(
+    program: Program, *, merge: bool = True, rows: bool = True, floor: float | None = None, whole: Source | None = None
+) -> Program:
     """The same shape with its parts placed from the sides of its bounding box about the middle of the grid.
 
     Parameters
@@ -56,6 +58,8 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True, floor: fl
         Height of the floor in the grid, in cells.  If it is given, the box ends where the parts end in height, and in
         depth unless they have an axis in the middle of the grid; it stands on the floor if at most a tenth of it is
         empty below the parts.  Read without its frame, the text is placed about the middle of that box.
+    whole
+        A placed source whose box is that of the result, instead of the box around the parts.
 
     Raises
     ------
@@ -66,6 +70,11 @@ def placed(program: Program, *, merge: bool = True, rows: bool = True, floor: fl
         return program
     low, high = _bounds(program)
     middle = np.zeros(3)
+    if whole is not None and whole.scale is not None:
+        numbers, scale = whole.evaluated_numbers(), whole.scale
+        extents = np.array([numbers[size] for size in ("height", "depth", "width")]) * scale.cells_per_unit
+        middle[:] = scale.floor + extents[UP] / 2, scale.middle, 0.0
+        low, high = middle - extents / 2, middle + extents / 2
     if floor is not None:
         if 0 < low[UP] - floor <= EMPTY * (high[UP] - floor):
             low[UP] = floor

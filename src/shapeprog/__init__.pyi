@@ -20,7 +20,7 @@ from .language.parametric import Parametric
 from .language.parser import parse
 from .language.printer import format_program
 from .language.program import Draw, Loop, Program
-from .language.statement import loop, statement, using
+from .language.statement import loop, statement
 from .language.tensors import Code, decode, encode
 from .language.unit import Unit
 from .language.unroll import unroll
@@ -35,6 +35,6 @@ __all__ = [
     "chamfer", "coverage", "decode", "encode", "evaluated", "export", "format_program", "in_unit",
     "infer", "inline", "learn", "liang2022", "load", "load_library", "load_shape", "load_statements",
     "load_with_frame", "loop", "names", "parse", "program_from_json", "program_to_json",
-    "random_program", "refine", "sample", "save", "save_library", "set", "statement", "unroll", "using",
+    "random_program", "refine", "sample", "save", "save_library", "set", "statement", "unroll",
     "with_library",
 ]  # fmt: skip

@@ -30,6 +30,8 @@ ROUNDING = 1e-5  # cells by which a length may be negative, as one of zero may c
 class Parametric:
     """The tensors of a program for any values of its free named numbers; counts, turns and axes do not change.
 
+    The larger radius of an upright taper stays the one that places it, unlike in :func:`shapeprog.set`.
+
     Attributes
     ----------
     names, values

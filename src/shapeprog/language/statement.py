@@ -321,7 +321,7 @@ def statement(
 ) -> Callable[[Callable[..., Any]], Statement]:
     """Declare a drawing statement from a function of annotated parameters that returns its solids.
 
-    Without ``doc`` the manual shows the first paragraph of the function's docstring; see :class:`Statement` for the rest.
+    Without ``doc`` the manual shows the first paragraph of the function's docstring; :class:`Statement` has the rest.
     """
     fields = {"pivot": pivot, "quarter": quarter, "paper": paper, "taught": taught, "hint": hint}
     return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, **fields)

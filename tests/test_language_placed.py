@@ -380,7 +380,7 @@ WRONG = [  # the place of the mistake is behind ^, and a word of the message or 
     ("box(^3)", "without a keyword; write width"),
     ("def f(a):\n    box(width=a)\nf(^3)", "without a keyword; write a=..."),
     ("leg(^cylinder(radius=1), left=3)", "write the keywords inside it: leg(cylinder(...))"),
-    ("^at(left=3)", "draws nothing itself"),
+    ("^at(left=3)", "a point is no part"),
     ("leg(cylinder(^rod(radius=1)))", "keyword"),
     ("box(^edge=1)", "edge"),
     ("seat(cushion(edge=1, ^lean=3))", "lean"),

@@ -255,10 +255,9 @@ def asked_unit(
         return own.to(unit)
     if frame is None:
         message = f"cannot write {path} in {unit}: the size of its cells is unknown"
-        cure = f"statements in cells have no size: infer the object with --unit {unit}"
-        raise InputError(
-            message, "infer it with --unit, or name its unit at the top, as in '# unit: cm'" if own else cure
-        )
+        cure = "infer it with --unit, or name its unit at the top, as in '# unit: cm'"
+        in_cells = f"statements in cells have no size: infer the object with --unit {unit}"
+        raise InputError(message, cure if own else in_cells)
     return Unit.of(frame, unit, file_unit or "")
 
 

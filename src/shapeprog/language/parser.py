@@ -77,7 +77,8 @@ def parse(text: str, name: str = "<program>") -> Program:
 
 
 def _is_in_cells(tree: ast.Module) -> bool:
-    """Whether a text holds statements in cells: it has no size of the whole, and has coordinates or loops alone."""
+    """Whether a text holds statements in cells: it declares no size of the whole, and has coordinates, a statement that
+    is no placed part, loops alone, or nothing."""
     nodes = list(ast.walk(tree))
     if set(SIZES) <= {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}:
         return False
@@ -210,13 +211,9 @@ class _Reader(Reader):
             return "box"
         message = f"{word} is a role, and a part has only one"
         self.require(word not in roles, call, message, "write the solid inside it")
-        if word in GROUPS or word == "at":
-            hint = (
-                f"write {GROUPS[word].example}"
-                if word in GROUPS
-                else "a point belongs to a solid: rod(start=at(...), ...)"
-            )
-            raise self.error(call, f"{word} draws nothing itself", hint)
+        self.require(word != "at", call, "a point is no part", "a point belongs to a solid: rod(start=at(...), ...)")
+        if word in GROUPS:
+            raise self.error(call, f"{word} draws nothing itself", f"write {GROUPS[word].example}")
         if word in self.function_names and word not in self.functions:
             raise self.error(call, f"{word} calls itself", "use a loop: functions call only those above them")
         if word not in self.functions:

@@ -386,7 +386,7 @@ def _try(declared: Statement) -> None:
             requirement = "sizes must be (..., 4), centres and a pivot (..., 3)"
         shapes = [None if part is None else tuple(part.shape) for part, _ in parts]
         box = Box(np.zeros(3), np.eye(3), np.array([6.0, 1.0, 1.0]))
-        starts = [len(start) for start in (declared.hint(box) if declared.hint else ())]
+        counts = {len(start) for start in declared.hint(box)} - {declared.size} if declared.hint else set()
     except Exception as cause:
         message = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
         hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions or none"
@@ -394,6 +394,6 @@ def _try(declared: Statement) -> None:
     if not parts or any(shape not in (None, right) for shape, (_, right) in zip(shapes, parts, strict=True)):
         requirement += " with the leading dimensions of the parameters"
         raise DeclarationError(f"{what} of shapes {shapes}", requirement)
-    if any(count != declared.size for count in starts):
-        message = f"the hint of statement {declared.name!r} yields {starts[0]} numbers"
+    if counts:
+        message = f"the hint of statement {declared.name!r} yields {min(counts)} numbers"
         raise DeclarationError(message, f"yield {declared.size}, one for each number of its parameters")

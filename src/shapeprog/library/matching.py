@@ -171,7 +171,7 @@ class Pattern:
         key = tuple(counts.values())
         if key not in self._nodes:
             shown = self._shown
-            side = max([BOX, *(4 * abs(value) for value in shown.values())])  # in which large defaults fit
+            side = max([BOX, *(4 * abs(shown.get(name, 0.0)) for name in self.measures)])  # large defaults fit in
             usual = {name: side if name in BOX_IN_CELLS else 1.0 for name in self.parameters} | shown | counts
             self._nodes[key] = call_in_cells(self.source, self.function.name, usual)
         return self._nodes[key]

@@ -74,13 +74,9 @@ def tie(
         return program
     with one_tensor_thread(kernels=1):
         try:
-            tied = placed(
-                plain if held else merged(plain),
-                merge=not held,
-                rows=False,
-                floor=floor,
-                whole=program.source if known else None,
-            )
+            written_by_hand = program.source if known else None
+            given = plain if held else merged(plain)
+            tied = placed(given, merge=not held, rows=False, floor=floor, whole=written_by_hand)
         except ShapeProgError:  # a statement without a placed form
             return program
         assert tied.source is not None

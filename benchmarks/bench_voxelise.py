@@ -16,7 +16,7 @@ import numpy as np
 import trimesh
 
 from shapeprog.data.sampling import sample_surface
-from shapeprog.data.voxelise import SHRINK, voxelise_mesh
+from shapeprog.geometry.voxelise import SHRINK, voxelise_mesh
 
 CENTRES = np.stack(np.meshgrid(*[np.arange(32) - 15.5] * 3, indexing="ij"), -1)
 FACES = 10_000

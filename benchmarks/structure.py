@@ -194,7 +194,7 @@ def fused(vertices: Any, faces: Any) -> tuple[Any, Any]:
     from scipy.ndimage import gaussian_filter
     from skimage.measure import marching_cubes
 
-    from shapeprog.data.voxelise import voxelise_mesh
+    from shapeprog.geometry.voxelise import voxelise_mesh
 
     low, high = vertices.min(0), vertices.max(0)
     scale, middle = CELLS / (high - low).max(), (low + high) / 2
@@ -207,7 +207,7 @@ def joined(vertices: Any, faces: Any) -> bool:
     """Whether a mesh in the grid frame is one piece, but for gaps that are narrower than 1 % of its longest side."""
     from scipy.ndimage import label
 
-    from shapeprog.data.voxelise import voxelise_mesh
+    from shapeprog.geometry.voxelise import voxelise_mesh
 
     cells = voxelise_mesh(np.asarray(vertices, np.float64) * PIECES, faces, resolution=32 * PIECES)
     return bool(label(cells, np.ones((3, 3, 3)))[1] == 1)

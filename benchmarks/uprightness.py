@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 from shapeprog.data.packs import read_pack
 from shapeprog.data.parts import part_files, read_parts
 from shapeprog.data.uprightness import WEIGHTS, find_up, measures
-from shapeprog.data.voxelise import voxelise_mesh
+from shapeprog.geometry.voxelise import voxelise_mesh
 from shapeprog.space import Array, Frame, axis_name
 
 LARGEST = {"bench": 200, "cabinet": 200}

@@ -190,7 +190,7 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
 
 @pytest.mark.parametrize(
     "module",
-    ["data.voxelise_kernels", "formats.format", "inference.cells.block_kernels", "view.raster_kernels"],
+    ["geometry.voxelise_kernels", "formats.format", "inference.cells.block_kernels", "view.raster_kernels"],
 )
 def test_a_module_loads_nothing_of_its_room_but_what_it_needs(module: str) -> None:
     found = run_python(f"import sys, shapeprog.{module}; print(*{{name.split('.')[0] for name in sys.modules}})")

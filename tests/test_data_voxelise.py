@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeprog.data.sampling import sample_surface
-from shapeprog.data.voxelise import SHRINK, occupied_bounds, resample_voxels, voxelise_mesh, voxelise_points
+from shapeprog.geometry.voxelise import SHRINK, occupied_bounds, resample_voxels, voxelise_mesh, voxelise_points
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -88,7 +88,7 @@ def test_touched_cells_equal_the_clipping_twin(seed):
     size = 8
     vertices = rng.uniform(-4.5, 4.5, (3, 1, 3)) + rng.normal(0, [[[0.3]], [[1.5]], [[4.0]]], (3, 3, 3))
     vertices, faces = vertices.reshape(-1, 3), np.arange(9).reshape(-1, 3)
-    from shapeprog.data.voxelise_kernels import mark_triangles
+    from shapeprog.geometry.voxelise_kernels import mark_triangles
 
     fast = np.zeros((size,) * 3, np.bool_)
     mark_triangles(np.ascontiguousarray(vertices[faces] + size / 2), 0.5 - SHRINK, fast)

@@ -22,7 +22,8 @@ import shapeprog as sp
 from shapeprog.cli import main
 from shapeprog.data import load
 from shapeprog.data.loading import ARRAY_SUFFIXES
-from shapeprog.errors import InputError, OutputError, ProgramError
+from shapeprog.data.synthetic.shapes import shapes_of
+from shapeprog.errors import InputError, OutputError, ProgramError, ShapeProgError
 from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
 from shapeprog.formats.colours import colour
 from shapeprog.formats.frames import frame_comment, frame_of_grid, in_grid_of, placement, scale_of
@@ -189,11 +190,35 @@ def test_files_that_hold_no_program_are_refused_in_words(tmp_path: Path):
 
 def test_samples_take_their_options_and_other_formats_refuse_them(tmp_path: Path):
     assert np.load(export(PROGRAM, tmp_path / "cells.npy", resolution=16)).shape == (16, 16, 16)
+    for name, number in (("a.npy", {"resolution": 5000}), ("a.npy", {"resolution": 1.5}), ("a.xyz", {"seed": 2**64})):
+        with pytest.raises(ShapeProgError, match="give a whole number"):
+            export(PROGRAM, tmp_path / name, **number)
     one, two = (export(PROGRAM, tmp_path / f"{seed}.xyz", FRAME, points=100, seed=seed) for seed in (1, 2))
     assert np.loadtxt(one).shape == (100, 6)
     assert (np.loadtxt(one) != np.loadtxt(two)).any()
     with pytest.raises(OutputError, match=r"\.glb takes no points"):
         export(PROGRAM, tmp_path / "table.glb", points=100)
+
+
+@pytest.mark.parametrize("resolution", [32, 64])
+def test_cells_are_those_that_thin_parts_touch(tmp_path: Path, resolution: int):
+    program = parse("width, depth, height = 24, 24, 24\nshelf(bottom=5.2, height=0.2)\nback(front=0, depth=0.1)")
+    cells = np.load(export(program, tmp_path / "a.npy", resolution=resolution))
+    step = resolution // 32
+    expected = np.zeros_like(cells)
+    low, high = 4 * step, 28 * step
+    expected[int(9.2 * step) : int(9.4 * step) + 1, low:high, low:high] = True
+    expected[low:high, low, low:high] = True
+    np.testing.assert_array_equal(cells, expected)
+    if resolution == 32:
+        np.testing.assert_array_equal(cells, shapes_of({"a": program})[0].voxels)
+
+
+@pytest.mark.parametrize("suffix", [".xyz", ".obj"])
+def test_points_far_from_the_origin_keep_their_digits(tmp_path: Path, suffix: str):
+    path = export(PROGRAM, tmp_path / f"a{suffix}", Frame(centre=(5e6, 4e5, 100), scale=0.0123))
+    values = path.read_text().replace("v ", "").split()
+    assert max(len(value.replace(".", "")) for value in values if value.startswith("5000000.")) >= 10
 
 
 def test_each_suffix_has_one_declaration_and_every_readable_shape_states_its_axes():

@@ -8,6 +8,8 @@ from typing import Any
 
 from shapeprog.errors import ShapeProgError
 
+MOST_SEED = (1 << 32) - 1  # seeds are multiplied and added in 64 bits
+
 
 def number_of(value: Any, *, whole: bool = False) -> float:
     """A value as a number, not a number (NaN) if it is none; booleans and text are none."""

@@ -75,7 +75,7 @@ def infer_command(
     terminal.check_axes(up, front)
     terminal.check_units(unit, file_unit)
     report = None if as_json else lambda sentence: terminal.note(f"{sentence.capitalize()}.")
-    others = ["data/", "geometry/neighbour", "evaluation/", *([] if no_picture else ["view/"])]
+    others = ["geometry/voxelise", "geometry/neighbour", "evaluation/", *([] if no_picture else ["view/"])]
     prepare(modules_of(*SURFACE_KERNELS, *others), report)
     inference = partial(
         infer, blocks=blocks, budget=budget, seed=seed, settings=None if rounds is None else Settings(rounds=rounds),

@@ -42,7 +42,7 @@ def shape_from_mesh(
         If it has no faces, no area, extent in one direction only, or coordinates that are not finite.
     """
     from shapeprog.data.sampling import sample_surface
-    from shapeprog.data.voxelise import voxelise_mesh
+    from shapeprog.geometry.voxelise import voxelise_mesh
 
     used = np.zeros(len(vertices), np.bool_)
     used[np.asarray(faces, np.int64).reshape(-1)] = True
@@ -81,7 +81,7 @@ def shape_from_points(
     InputError
         If there are fewer than :data:`LEAST_POINTS`, extent in one direction only, or coordinates that are not finite.
     """
-    from shapeprog.data.voxelise import voxelise_points
+    from shapeprog.geometry.voxelise import voxelise_points
 
     frame = _frame(cloud, name, axes)
     if len(cloud) < LEAST_POINTS:
@@ -123,7 +123,7 @@ def shape_from_voxels(
     InputError
         If no cell is occupied.
     """
-    from shapeprog.data.voxelise import occupied_bounds, resample_voxels
+    from shapeprog.geometry.voxelise import occupied_bounds, resample_voxels
 
     turn = np.eye(3) if axes is None else np.asarray(axes, np.float64)
     order = np.abs(turn).argmax(0)  # the world axis along each grid axis

@@ -8,7 +8,7 @@ CD
 F1
     F-score of the same points at a distance of one grid cell.
 IoU
-    Cells of the program, see :mod:`shapeprog.data.touched`, against the touched cells of the target, at 32^3.
+    Cells of the program, see :mod:`shapeprog.formats.samples`, against the touched cells of the target, at 32^3.
 Likeness
     F1@.5 %, F1@1 %, normals and silhouette: see :mod:`shapeprog.evaluation.likeness`.  Normals and silhouette need a
     mesh as target; F1 needs points at least.
@@ -34,10 +34,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.data.shape import Shape
-from shapeprog.data.touched import occupied
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation import likeness, structure
 from shapeprog.evaluation.likeness import Samples, Triangles
+from shapeprog.formats.samples import occupied
 from shapeprog.geometry import cells
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.geometry.nearest import squared_distance
@@ -141,7 +141,7 @@ def evaluate_program(
         The shape it should be.
     snapped
         The whole-numbered program whose IoU is measured; by default see
-        :func:`shapeprog.data.touched.occupied`.
+        :func:`shapeprog.formats.samples.occupied`.
     points
         Points on each surface.
     seed

@@ -15,7 +15,6 @@ from shapeprog.data.parts import read_parts
 from shapeprog.data.reading import in_words
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
-from shapeprog.data.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.evaluation.likeness import Triangles
 from shapeprog.evaluation.metrics import (
@@ -32,6 +31,7 @@ from shapeprog.formats.files import load_with_frame, program_files
 from shapeprog.formats.format import suffixes
 from shapeprog.formats.frames import in_grid_of
 from shapeprog.formats.json_form import Result, read_result
+from shapeprog.geometry.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import Array, Frame

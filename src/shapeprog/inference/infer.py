@@ -17,11 +17,11 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-from shapeprog.arguments import check_number
+from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.data.loading import load
 from shapeprog.data.shape import Shape
-from shapeprog.data.touched import occupied
 from shapeprog.errors import ShapeProgError
+from shapeprog.formats.samples import occupied
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.inference.assembly import assemble
@@ -158,6 +158,7 @@ def infer(
         metres(unit)
     check_number("blocks", blocks, 0, whole=True)
     check_number("detail", detail, 0, above=True)
+    check_number("seed", seed, 0, MOST_SEED, whole=True)
     if statements not in ("all", "paper"):
         raise ShapeProgError(f"unknown statements {statements!r}", "choose all or paper")
     target = shape if isinstance(shape, Shape) else load(shape)

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 
 from shapeprog.data.shape import Shape
-from shapeprog.geometry.cells import voxels
+from shapeprog.formats.samples import occupied
+from shapeprog.geometry.cells import unpack
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
@@ -26,9 +27,10 @@ def shapes_of(programs: Mapping[str, Program], points: int = 0, seed: int = 0) -
     seed
         Seed of the points.
     """
-    scene = unroll(list(programs.values()))
-    cells = voxels(scene).numpy().astype(np.bool_)
+    packed = torch.stack([occupied(program, unroll(program)) for program in programs.values()])
+    cells = unpack(packed).numpy().astype(np.bool_)
     if not points:
         return [Shape(name, grid) for name, grid in zip(programs, cells, strict=True)]
+    scene = unroll(list(programs.values()))
     clouds = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.numpy().astype(np.float32)
     return [Shape(name, *arrays) for name, *arrays in zip(programs, cells, clouds, strict=True)]

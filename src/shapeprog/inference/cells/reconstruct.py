@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from shapeprog.data.shape import Shape
-from shapeprog.data.touched import occupied
+from shapeprog.formats.samples import occupied
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.geometry.distance import signed_distance

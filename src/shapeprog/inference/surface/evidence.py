@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
-from shapeprog.data.voxelise_kernels import mark_triangles
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import triangle_normals, union_mesh
+from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
 from shapeprog.inference.surface.components import Components, IntArray, components, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out

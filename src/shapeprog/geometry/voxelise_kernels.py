@@ -1,4 +1,4 @@
-"""Kernels of :mod:`shapeprog.data.voxelise`: triangles into cells, and views from six sides.
+"""Kernels of :mod:`shapeprog.geometry.voxelise`: triangles into cells, and views from six sides.
 
 Coordinates are in cells with the origin at the corner of the grid, so cell ``k`` covers ``[k, k + 1]``.
 """

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import InputError
+from shapeprog.geometry.voxelise_kernels import first_hits, mark_hidden, mark_triangles
 from shapeprog.space import HALF, RESOLUTION, Array
 
 BoolArray = npt.NDArray[np.bool_]
@@ -40,8 +41,6 @@ def voxelise_mesh(vertices: Array, faces: Array, resolution: int = RESOLUTION) -
     resolution
         Cells along each side.
     """
-    from shapeprog.data.voxelise_kernels import mark_triangles
-
     corners = np.asarray(vertices, np.float64) + resolution / 2
     triangles = corners[np.asarray(faces, np.int64).reshape(-1, 3)]
     touched = np.zeros((resolution,) * 3, np.bool_)
@@ -137,8 +136,6 @@ def occupied_bounds(voxels: Array, name: str = "the voxel grid") -> tuple[Array,
 
 def _carve(barrier: BoolArray, hole: int, start: int, stride: int, cells: BoolArray) -> None:
     """Mark the cells that none of the six views along the axes can see (Nooruddin & Turk 2003, ray stabbing)."""
-    from shapeprog.data.voxelise_kernels import first_hits, mark_hidden
-
     views, scratch = np.empty((6, *barrier.shape[:2]), np.int64), np.empty(barrier.shape[:2], np.int64)
     for side in range(6):
         first_hits(barrier, side // 2, bool(side % 2), hole, scratch, views[side])
@@ -150,8 +147,6 @@ def _mark_boundary_sheets(triangles: Array, cells: BoolArray) -> None:
 
     The layer nearer the middle of the grid gets it, so that mirrored shapes stay mirrored and nothing grows.
     """
-    from shapeprog.data.voxelise_kernels import mark_triangles
-
     size = len(cells)
     for axis in range(3):
         first = triangles[:, 0, axis]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from shapeprog.arguments import MOST_SEED
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.files import output_error
 from shapeprog.formats.format import CELLS
@@ -36,8 +37,8 @@ Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def _checked_seed(seed: int) -> int:
-    if seed >= 1 << 63:  # as a maximum of the option it would be printed in every help
-        raise typer.BadParameter(f"{seed} is not below 2^63.")
+    if seed > MOST_SEED:  # as a maximum of the option it would be printed in every help
+        raise typer.BadParameter(f"{seed} is not below 2^32.")
     return seed
 
 

@@ -73,7 +73,7 @@ def obj(program: Program, frame: Frame, stem: str) -> dict[str, str]:
     lines, first = [f"mtllib {stem}.mtl"], 1
     for part in each:
         lines += [f"o {part.name}", f"usemtl {part.word}"]
-        lines += ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in part.vertices.tolist()]
+        lines += ["v {:.12g} {:.12g} {:.12g}".format(*vertex) for vertex in part.vertices.tolist()]
         lines += ["f {} {} {}".format(*face) for face in (part.faces + first).tolist()]
         first += len(part.vertices)
     materials = []

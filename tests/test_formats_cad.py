@@ -290,11 +290,11 @@ def test_a_cut_list_has_each_distinct_part_once(tmp_path: Path, capsys: pytest.C
         (4, "foot", "round", 10, 0, 0, 4),
         (4, "foot", "tapered from 2 to 4", 8, 0, 0, 4),
         (1, "seat", "rounded edges 2", 80, 40, 6, 0),
-        (1, "back", "leaning by 5", 80, 60, 2, 0),
+        (1, "back", "board, leaning by 5", 80, 60.21, 2, 0),
         (1, "rail", "bent", round(arc, 2), 0, 0, 2),
     }
     assert found.coinciding == 1
-    assert found.area == "1.24 m²"  # two sides, a panel, a shelf
+    assert found.area == "1.72 m²"  # two sides, a panel, a shelf, the back
     program_file = tmp_path / "cabinet.shape"
     program_file.write_text(CABINET.lstrip())
     with pytest.raises(SystemExit, match="0"):
@@ -304,6 +304,20 @@ def test_a_cut_list_has_each_distinct_part_once(tmp_path: Path, capsys: pytest.C
     assert lines[0] == "count,role,length (mm),width (mm),thickness (mm),diameter (mm),shape"
     assert "2,side,600,400,18,,board" in lines
     assert "4,foot,100,,,40,round" in lines
+
+
+@pytest.mark.parametrize(
+    ("plane", "part"),
+    [
+        ("y=0", "leg(x=0, width=4, y=0, depth=4, lean=36)"),
+        ("z=0", "leg(taper(x=0, y=0, z=0, radius=(1, 2), height=8))"),
+        ("z=0", "rail(bent_rod(start=at(left=0, z=0), through=at(x=0, bottom=40), end=at(right=0, z=0), radius=1))"),
+    ],
+)
+def test_parts_that_differ_in_direction_alone_are_no_copies(plane: str, part: str):
+    for mirror, count in ((plane, 2), ("x=0", 1)):
+        program = parse(f"width, depth, height = 60, 40, 50\nfor _ in mirror({mirror}):\n    {part}\n")
+        assert [number for _, number in cut_list(program, Frame()).cuts] == [count]
 
 
 def test_areas_of_inches_are_in_square_feet_and_a_section_has_one_word(tmp_path: Path):

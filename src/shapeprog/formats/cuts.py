@@ -37,11 +37,12 @@ class Cut(NamedTuple):
     role
         Its role or statement.
     shape
-        ``board``, ``round``, the dimensions needed to make it, such as ``rounded edges 3``, or empty for other boxes.
+        ``board``, ``round``, the dimensions needed to make it, such as ``rounded edges 3`` or ``board, leaning by 5``,
+        or empty for other boxes.
     length
-        Its longest side, or the length of a round part.
+        Its longest edge, or the length of a round part.
     width, thickness
-        The other sides of a part that is not round.
+        The other edges of a part that is not round.
     diameter
         That of a round part.
     """
@@ -57,17 +58,19 @@ class Cut(NamedTuple):
 class CutList(NamedTuple):
     """The distinct parts of a program with their counts, largest first, in a unit.
 
-    ``coinciding`` copies lie where another one lies, and are not counted.
+    ``coinciding`` copies lie where another one lies, and ``dropped`` parts have a side that rounds to 0; neither are
+    counted.
     """
 
     cuts: tuple[tuple[Cut, int], ...]
     unit: str
     coinciding: int
+    dropped: int
 
     @property
     def area(self) -> str:
         """Total length x width of all boards."""
-        total = sum(count * cut.length * cut.width for cut, count in self.cuts if cut.shape == BOARD)
+        total = sum(count * cut.length * cut.width for cut, count in self.cuts if cut.shape.startswith(BOARD))
         size, unit = (FOOT, "ft²") if self.unit == "in" else (1.0, "m²" if self.unit else "square units")
         total *= (METRES.get(self.unit, 1.0) / size) ** 2
         return f"{float(f'{total:.{DIGITS}g}'):g} {unit}"
@@ -91,6 +94,9 @@ class CutList(NamedTuple):
         if self.coinciding:
             copies = f"{self.coinciding} copies lie" if self.coinciding > 1 else "1 copy lies"
             lines.append(f"Warning: {copies} where another one lies (a mirror through the part?).")
+        if self.dropped:
+            parts = f"{self.dropped} parts are" if self.dropped > 1 else "1 part is"
+            lines.append(f"Warning: {parts} left out: thinner than {500 * FINEST:g} mm (is the unit right?).")
         return "\n".join(lines)
 
 
@@ -98,11 +104,12 @@ class CutList(NamedTuple):
 def cut_list(program: Program, frame: Frame, unit: str = "") -> CutList:
     """The distinct parts of a program; ``frame.scale`` is the size of a cell in ``unit``, which is empty if unknown."""
     with exact_scene(program) as scene:
-        copies = list(_copies(scene, program, frame.scale, unit))
+        solids = list(_copies(scene, program, frame.scale, unit))
+    copies = [(cut, key) for cut, key in solids if min(cut.length, cut.thickness + cut.diameter) > 0]
     distinct = set(copies)
     counts = Counter(cut for cut, _ in distinct)
     rows = sorted(counts.items(), key=_order)
-    return CutList(tuple(rows), unit, len(copies) - len(distinct))
+    return CutList(tuple(rows), unit, len(copies) - len(distinct), len(solids) - len(copies))
 
 
 def _order(row: tuple[Cut, int]) -> tuple[bool, float, float, Cut]:
@@ -128,15 +135,18 @@ def cut_table(program: Program, frame: Frame | None = None, **asked: Any) -> str
 
 
 def _copies(scene: Any, program: Program, scale: float, unit: str) -> Iterator[tuple[Cut, tuple[float, ...]]]:
-    """The entry of every part that has a volume, and where it lies: its centre and the square of its extents."""
+    """The entry of every part that has a volume, and where it lies: the moments of its corners."""
     words, blocks, kinds = [draw.word for draw in program.draws], scene.block.tolist(), scene.kind.tolist()
     solid, sizes, centre, rotation, halves = solids_of(scene)
     rounded = partial(_rounded, scale=scale, unit=unit)
     for slot in np.flatnonzero(solid).tolist():
         cut = _cut(words[blocks[slot]], primitives[kinds[slot]].name, sizes[slot], halves[slot], rounded)
-        if min(cut.length, cut.thickness + cut.diameter) > 0:
-            spread = rotation[slot] @ np.diag(halves[slot] ** 2) @ rotation[slot].T
-            yield cut, tuple(np.rint(np.concatenate([centre[slot], spread.ravel()]) / SAME).tolist())
+        vertices = primitives[kinds[slot]].mesh(sizes[slot])[0] @ rotation[slot].T
+        offsets = vertices - vertices.mean(0)
+        square = (offsets**2).sum(1, keepdims=True)  # the third moment is the direction of a taper
+        spread = (offsets.T @ offsets).ravel() / len(offsets), (offsets * square).sum(0) / square.sum()
+        key = np.concatenate([centre[slot] + vertices.mean(0), *spread])
+        yield cut, tuple(np.rint(key / SAME).tolist())
 
 
 def _cut(role: str, name: str, size: FloatArray, half: FloatArray, rounded: Callable[[float], float]) -> Cut:
@@ -152,13 +162,14 @@ def _cut(role: str, name: str, size: FloatArray, half: FloatArray, rounded: Call
         return Cut(role, "bent", rounded(along), diameter=rounded(2 * size[1]))
     shape = ""
     if name == "cuboid":
-        half, lean = size[:3], rounded(abs(size[3]))
+        half, lean = np.array([math.hypot(size[0], size[3] / 2), *size[1:3]]), rounded(abs(size[3]))
         shape = f"leaning by {lean:g}" if lean > 0 and abs(size[3]) > FLAT * min(half) else ""
     elif name == "rounded_box":
         edge = rounded(min(size[3], *size[:3]))
         shape = f"rounded edges {edge:g}" if edge > 0 else ""
     thickness, width, length = (rounded(2 * side) for side in sorted(half))
-    return Cut(role, shape or (BOARD if 2 * thickness <= width else ""), length, width, thickness)
+    board = BOARD if 2 * thickness <= width and not shape.startswith("rounded") else ""
+    return Cut(role, ", ".join(filter(None, (board, shape))), length, width, thickness)
 
 
 def _rounded(cells: float, scale: float, unit: str) -> float:

@@ -166,6 +166,32 @@ def test_tidy_keeps_the_unit_or_takes_another(run: Run, tmp_path: Path) -> None:
             assert unroll(two).distance(points).abs().max() < 0.2
 
 
+def test_a_program_without_a_unit_or_a_frame_has_that_of_its_file(run: Run, tmp_path: Path) -> None:
+    sizes = "width, depth, height = 40, 20, 30\nbox(height=2, bottom=0)\ntop(top=0, height=2)\n"
+    (tmp_path / "bare.shape").write_text(sizes)
+    ended = run("export", "bare.shape", "a.stl", "a.csv", "--file-unit", "cm", "--on-input")
+    assert "does not say how its input lies" in ended.err, "of the mesh; a cut list has no position"
+    assert "length (cm)" in ended.out
+    for words in (["export", "bare.shape", "b.stl"], ["tidy", "bare.shape", "mm.shape", "--unit", "mm"]):
+        ended = run(*words, "--file-unit", "cm")
+        assert ended.code == 0, ended.err
+    np.testing.assert_allclose(wide(tmp_path / "b.stl"), [400, 200, 300], rtol=1e-6)
+    assert "# unit: mm\nwidth, depth, height = 400, 200, 300\n" in (tmp_path / "mm.shape").read_text()
+
+
+def test_python_exports_programs_in_the_unit_that_is_asked_for(tmp_path: Path) -> None:
+    program = parse("# unit: cm\nwidth, depth, height = 25.4, 25.4, 50.8\ntop(top=0, height=2.54)\n")
+    text = export(program, tmp_path / "a.shape", unit="in").read_text()
+    assert text.startswith("# unit: in\nwidth, depth, height = 10, 10, 20\n")
+
+
+def test_parts_that_round_to_nothing_are_told(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.shape").write_text(
+        "# unit: mm\nwidth, depth, height = 4, 4, 4\nback(front=0, depth=0.02)\nleg(width=1)"
+    )
+    assert "1 part is left out: thinner than 0.05 mm" in run("export", "a.shape", "a.csv").out
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -177,6 +203,9 @@ def test_tidy_keeps_the_unit_or_takes_another(run: Run, tmp_path: Path) -> None:
         (["tidy", "cells.shape", "--unit", "cm"], "infer the object with --unit cm"),
         (["export", "legs.shape", "a.scad", "--unit", "cm"], "write its unit at the top"),
         (["export", "mixed.shape", "a.shape", "--unit", "cm"], "n stands for a length in one place"),
+        (["export", "cm.shape", "a.csv", "--file-unit", "mm"], "the program states its unit, cm"),
+        (["export", "cm.shape", "a.shape", "--unit", "m", "--file-unit", "mm"], "the program states its unit, cm"),
+        (["export", "cm.shape", "a.glb", "--on-input", "--up", "z"], "give one of them"),
         (["export", "bad.shape", "a.stl"], "bad.shape, line 2, column 9: unknown unit 'c'"),
     ],
 )
@@ -185,6 +214,7 @@ def test_units_that_cannot_be_are_told(run: Run, tmp_path: Path, words: list[str
     (tmp_path / "legs.shape").write_text(NAMED)
     (tmp_path / "cells.shape").write_text("leg(at=(0, 0, 0), size=(1, 1, 1))")
     export(parse(NAMED.replace("x=span", "x=span, y=n")), tmp_path / "mixed.shape", FRAME)
+    (tmp_path / "cm.shape").write_text(f"# placed: up y, front z, origin 0 0 0, 1 unit = 0.01\n# unit: cm\n{NAMED}")
     (tmp_path / "bad.shape").write_text(
         "# placed: up y, front z, origin 0 0 0, 1 unit = 1\n# unit: c\nwidth, depth, height = 1, 1, 1\n"
     )

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from shapeprog.language.program import Program
-    from shapeprog.language.unit import Unit
     from shapeprog.library import Library
     from shapeprog.space import Frame
 
@@ -239,27 +238,6 @@ def assumed(frame: Frame, unit: str = "") -> str:
     unit = unit or assumed_unit(longest)
     message = f"The unit of the file is assumed to be {unit}, so that the longest side is"
     return f"{message} {longest * metres(unit):.3g} m. Another unit: --file-unit {'cm' if unit == 'mm' else 'mm'}"
-
-
-def asked_unit(
-    own: Unit | None, frame: Frame | None, path: Path | str, unit: str | None, file_unit: str | None
-) -> Unit | None:
-    """The unit that was asked for, of the object in a file, or that which its program is in already; an ``InputError``
-    if the size of the object is not known."""
-    from shapeprog.language.unit import Unit
-
-    if unit is None:
-        return own
-    if unit == CELLS:
-        return None
-    if own is not None and own.name and file_unit is None:
-        return own.to(unit)
-    if frame is None:
-        message = f"cannot write {path} in {unit}: the size of its cells is unknown"
-        cure = "infer it with --unit, or name its unit at the top, as in '# unit: cm'"
-        in_cells = f"statements in cells have no size: infer the object with --unit {unit}"
-        raise InputError(message, cure if own else in_cells)
-    return Unit.of(frame, unit, file_unit or "")
 
 
 def load_modules(modules: Sequence[Path] | None) -> None:

@@ -34,6 +34,7 @@ def tidy_command(
     comments and earlier names are left out. Programs with groups or functions are refused.
     """
     from shapeprog.formats import save
+    from shapeprog.formats.frames import asked_unit
     from shapeprog.inference.readable import in_readable_unit
     from shapeprog.inference.surface.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import tie
@@ -52,7 +53,7 @@ def tidy_command(
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
     if any(getattr(line, "text", "") or getattr(line, "note", "") for line in lines):  # a comment, or a line with one
         terminal.warn(program, "its comments are left out")
-    wanted = terminal.asked_unit(given.unit, frame, program, unit, file_unit)
+    wanted = asked_unit(given, frame, unit, file_unit, program)
     result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
     if libraries:
         result = with_library(result, joined(libraries))

@@ -83,14 +83,7 @@ def export_command(
     failures: list[ShapeProgError] = []
     for path in outputs:
         try:
-            written = loaded
-            if unit is not None and path.suffix.lower() in suffixes("program"):
-                from shapeprog.language.dimensions import in_unit
-
-                asked_unit = terminal.asked_unit(loaded.unit, frame, program, unit, file_unit)
-                if asked_unit != loaded.unit:  # statements in cells can be in no other
-                    written = in_unit(loaded, asked_unit, workshop=True)
-            export(written, path, frame, **asked)
+            export(loaded, path, frame, **asked)
         except ShapeProgError as error:  # the other files do not depend on this one
             failures.append(error)
             continue

@@ -9,7 +9,7 @@ from pathlib import Path
 from shapeprog.errors import InputError, OutputError, did_you_mean
 from shapeprog.files import write_bytes
 from shapeprog.formats.format import Format, format_of, listed, program_suffixes, suffixes
-from shapeprog.formats.frames import placement
+from shapeprog.formats.frames import asked_unit, placement
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
 
@@ -141,6 +141,12 @@ def export(
     """
     target = Path(path)
     file_format, suffix = written_format(target), target.suffix.lower()
+    if file_format.kind == "program" and unit:
+        from shapeprog.language.dimensions import in_unit  # few programs are converted
+
+        asked = asked_unit(program, frame, unit, file_unit, target)
+        if asked != program.unit:  # statements in cells can be in no other
+            program = in_unit(program, asked, workshop=True)
     lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
     known: dict[str, int | str] = {"unit": lies.unit, "stem": target.stem}
     takes = file_format.options

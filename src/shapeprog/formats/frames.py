@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import astuple, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ from shapeprog.language.placement import LONGEST_SIDE
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.text import Text
-from shapeprog.language.unit import METRES, assumed_unit, metres
+from shapeprog.language.unit import METRES, Unit, assumed_unit, metres
 from shapeprog.space import SPAN, FloatArray, Frame, axis_direction, axis_name, grid_axes
 
 _LINE_END = r"(?:\r?\n|\r(?!\n))"
@@ -43,6 +44,7 @@ _ENTRIES = re.compile(
     rf"1 unit *= *({_NUMBER})(?: +[a-z]+)?\s*"
 )
 
+_CURE = "infer it with --unit, or write its unit at the top, as in '# unit: cm'"
 _ALIGNED = 1e-9  # largest difference of a direction from the axis as which it is written
 _ROUNDED = 1e-7  # share of the longest side by which the origin of a text is rounded
 
@@ -102,7 +104,9 @@ def placement(
         return Placement(Frame())
     if up and up.removeprefix("+") not in UP:
         raise InputError(f"{up!r} is no axis that points up", "use x, y or z")
-    if on_input and frame is None:
+    if up and on_input:
+        raise InputError("--on-input takes the axes of the input, --up another one", "give one of them")
+    if on_input and frame is None and chosen.kind != "list":
         raise InputError("the program does not say how its input lies", "export a program that infer has written")
     if on_input is None:
         on_input = not chosen.maker
@@ -121,8 +125,10 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
     """The size of a cell in a file, and the unit that it is in, empty if it is not known."""
     if unit == CELLS:
         return 1.0, ""
-    own, known = program.unit, "" if program.unit is None else program.unit.name
+    own, known = program.unit, _named(program, file_unit)
     per_cell = 1.0 if own is None else own.per_cell
+    if frame is None:
+        known = known or file_unit
     if program.scale is not None:
         per_cell = 1 / program.scale.cells_per_unit  # not rounded
     wanted = unit or chosen.unit
@@ -130,14 +136,58 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
         wanted = known or ("" if frame is None else "mm")
     if not wanted:
         return (per_cell, known) if frame is None else (frame.scale, "")
-    if frame is not None and (file_unit or not known):
+    if frame is not None and not known:
         per_cell, known = frame.scale, file_unit or assumed_unit(SPAN * frame.scale)
     if known:
         return per_cell * (metres(known) / metres(wanted)), wanted
     if unit:
         message = f"cannot write {' '.join(chosen.suffixes)} in {unit}: the size of the object is unknown"
-        raise InputError(message, "infer it with --unit, or write its unit at the top, as in '# unit: cm'")
+        raise InputError(message, _CURE)
     return per_cell, ""
+
+
+def _named(program: Program, file_unit: str) -> str:
+    """The name of the unit in a program, or empty; an ``InputError`` if it has one, and ``file_unit`` is given too."""
+    known = "" if program.unit is None else program.unit.name
+    if known and file_unit:
+        message = f"--file-unit {file_unit} has no effect: the program states its unit, {known}"
+        raise InputError(message, f"leave it out, or correct the line '# unit: {known}'")
+    return known
+
+
+def asked_unit(
+    program: Program, frame: Frame | None, unit: str | None, file_unit: str | None, path: Path | str
+) -> Unit | None:
+    """The unit in which a program is asked for, or that in which it is already.
+
+    Parameters
+    ----------
+    program, frame
+        The program, and the map from the grid to the coordinates of its input, if it is known.
+    unit, file_unit
+        The unit that is asked for, or ``cells``, and that of the file.
+    path
+        What is written, for errors.
+
+    Raises
+    ------
+    InputError
+        If the size of the object is not known, or stated twice.
+    """
+    own = program.unit
+    if unit is None:
+        return own
+    if unit == CELLS:
+        return None
+    if _named(program, file_unit or ""):
+        assert own is not None
+        return own.to(unit)
+    if frame is not None:
+        return Unit.of(frame, unit, file_unit or "")
+    if own is not None and file_unit:
+        return Unit(file_unit, own.per_cell).to(unit)
+    in_cells = f"statements in cells have no size: infer the object with --unit {unit}"
+    raise InputError(f"cannot write {path} in {unit}: the size of its cells is unknown", _CURE if own else in_cells)
 
 
 def _ground(program: Program, rests: bool) -> FloatArray:

@@ -380,6 +380,14 @@ def test_json_lists_the_solids_with_their_lines_and_bounds():
     assert in_cells["solids"][1] | {"role": "leg", "low": [6, -11, -12], "high": [8, -9, 10]} == in_cells["solids"][1]
 
 
+def test_json_bounds_of_turned_round_solids_are_theirs():
+    feet = "for _ in rotate(3):\n    foot(cylinder(width=6, front=11, height=4))\n"
+    content = json.loads(program_to_json(parse(f"width, depth, height = 40, 40, 40\n{feet}")))
+    for entry in content["solids"]:
+        sides = np.subtract(entry["high"], entry["low"])
+        np.testing.assert_allclose(sides, [6, 6, 4], rtol=3e-3)
+
+
 def test_json_of_very_many_solids_has_no_list_of_them():
     program = parse("for i in translate(20000, by=(0.001, 0, 0)):\n    leg(at=(0, 0, 0), size=(1, 1, 1))\n")
     assert "solids" not in json.loads(program_to_json(program))

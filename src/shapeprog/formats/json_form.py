@@ -6,7 +6,7 @@
  "frame": {"origin": [0, 0, 0], "scale": 0.01, "axes": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}}
 
 ``text`` is the content of a ``.shape`` file; it alone is read.  The bounds of solids are along x (right), y (rear) and
-z (up) in the unit of the text; those of round solids that lean are a little larger.  ``frame`` maps them to the
+z (up) in the unit of the text; those of round solids that are turned are exact to .2 %.  ``frame`` maps them to the
 coordinates of the input: origin + scale * axes @ (x, y, z).
 """
 

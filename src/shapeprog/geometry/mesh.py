@@ -75,17 +75,6 @@ def solids_of(scene: Batch) -> Solids:
     return Solids(solid, size, centre, rotation, reach)
 
 
-def bounds(scene: Batch) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-    """The slot of each solid part of one scene, and the low and high corner (3,) of a box around it.
-
-    It is the smallest one for boxes and for parts along the axes of the grid; raises what :func:`solids_of` does.
-    """
-    parts = solids_of(scene)
-    half = (np.abs(parts.rotation) @ parts.half[..., None])[..., 0]
-    for slot in np.flatnonzero(parts.solid).tolist():
-        yield slot, parts.centre[slot] - half[slot], parts.centre[slot] + half[slot]
-
-
 def part_meshes(scene: Batch) -> list[PartMesh]:
     """A watertight mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out.
 
@@ -110,6 +99,18 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
             )
         results.append(PartMesh(slot, vertices @ rotation[slot].T + centre[slot], faces))
     return results
+
+
+def bounds(scene: Batch) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    """The slot of each solid part of one scene, and the low and high corner (3,) of the box around it.
+
+    It is exact to .2 % of round parts that are turned, and exact for others; raises what :func:`part_meshes` does.
+    """
+    parts = solids_of(scene)
+    half = (np.abs(parts.rotation) @ parts.half[..., None])[..., 0]
+    for slot, vertices, _ in part_meshes(scene):  # round parts are prisms there
+        low, high = parts.centre[slot] - half[slot], parts.centre[slot] + half[slot]
+        yield slot, np.maximum(low, vertices.min(0)), np.minimum(high, vertices.max(0))
 
 
 def union_mesh(scene: Batch) -> Triangles:

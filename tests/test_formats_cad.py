@@ -23,6 +23,7 @@ from shapeprog.formats.build123d import script_text
 from shapeprog.formats.cuts import cut_list
 from shapeprog.formats.frames import placement
 from shapeprog.formats.openscad import scad_text
+from shapeprog.formats.parts import parts
 from shapeprog.language.parser import parse
 from shapeprog.space import Frame, grid_axes
 
@@ -190,17 +191,25 @@ def test_scripts_keep_loops_names_functions_roles_and_comments():
 
 
 def test_words_of_a_script_are_no_names_of_numbers(tmp_path: Path):
-    text = "width, depth, height = 4, 5, 6\ncube, scale, h\u00f6he, len = 1, 2, 3, 4\n"
+    text = "width, depth, height = 4, 5, 6\ncube, scale, h\u00f6he, len, \u00f8 = 1, 2, 3, 4, 5\n"
     text += "def union(parts):\n    box(left=parts, height=len)\nbox(left=cube, bottom=scale)\nunion(parts=h\u00f6he)\n"
     program = parse(text)
     scad, script = scad_text(program, FRAME), script_text(program, FRAME)
     assert "\ncube_ = 1;" in scad
     assert "\nh_he = 3;" in scad
     assert "module union_(parts)" in scad
-    assert "\ncube = 1\nscale_ = 2\nh_he = 3\nlen_ = 4\n" in script
+    assert "\ncube = 1\nscale_ = 2\nh_he = 3\nlen_ = 4\n__ = 5\n" in script
     ast.parse(script)
     if shutil.which("openscad"):
         same(of_openscad(scad, tmp_path), of_meshes(program, FRAME))
+
+
+def test_a_role_around_a_call_names_cushions_and_boxes_alike():
+    text = "width, depth, height = 40, 40, 40\ndef soft():\n    cushion(height=5, edge=1)\n    box(bottom=5)\n"
+    for line, names in (("drawer(soft())", ["drawer_1", "drawer_2"]), ("soft()", ["cushion_1", "box_1"])):
+        program = parse(f"{text}{line}\n")
+        assert [part.name for part in parts(program)] == names
+        assert ("drawer(soft())" in script_text(program, FRAME)) == ("drawer_1" in names)
 
 
 def read_3mf(path: Path):

@@ -175,7 +175,7 @@ def _renamed(line: Line, words: dict[str, str], inner: str, boxed: bool) -> Line
 
 def _free_names(names: Sequence[str], reserved: Collection[str]) -> dict[str, str]:
     """Names of letters, digits and underscores that are no reserved words, all different."""
-    unavailable, words = {*reserved}, dict[str, str]()
+    unavailable, words = {*reserved, "_"}, dict[str, str]()
     for name in dict.fromkeys(names):
         word = name if name in SIZES else re.sub(r"[^A-Za-z0-9_]", "_", name)
         while name not in SIZES and (word in unavailable or word in words.values()):

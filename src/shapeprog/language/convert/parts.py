@@ -50,9 +50,8 @@ class Parts(Forms):
                 spans = from_corner(v[:3], v[3:6])
                 if name == "cushion":
                     kind, keywords = "cushion", (("edge", self.written(v[6])),)
-                    role = role or "cushion"
                     if self.number(v[6]) < 0:
-                        kind, keywords = "box", ()
+                        kind, keywords, role = "box", (), role or "cushion"
                 elif name != "box":
                     keywords = self._extra("tilt" if name == "board" else "lean", v[6])
                     straight = (True, not keywords, not keywords)

@@ -62,7 +62,7 @@ def infer_command(
 
     The program keeps the position of the input, so later exports lie on it. The same seed gives the same files.
     An input that cannot be read is reported at the end; the others are processed. A second run replaces the results of
-    the first, unless a .shape file was edited.
+    the first, unless a .shape file was edited. Results in a folder of inputs are no inputs.
     """
     from shapeprog.cli.results import document, free_stem, measured, write
     from shapeprog.data import load_all

@@ -84,6 +84,7 @@ def load_all(
     """Every shape of files, of folders with all within, and of files with many; a broken one as its error.
 
     The order is that of ``paths``, and within a folder that of the names.  A broken file never stops the others.
+    Results of ``infer`` in a folder are left out: NAME.glb beside NAME.json and NAME.shape.
 
     Parameters
     ----------
@@ -237,9 +238,15 @@ def _files_in(folder: Path) -> tuple[list[Path], Skipped]:
     # ShapeNet has voxels and mesh of an object in one folder: one shape, read from the mesh.
     meshes = {path.parent for path in files if path.suffix.lower() != ".binvox" and in_shapenet_layout(path)}
     files = [path for path in files if not (path.suffix.lower() == ".binvox" and path.parent in meshes)]
+    files = [path for path in files if not _is_result(path)]
     if not files and not skipped:
         raise InputError(f"the folder {folder} holds no file that can be read as a shape", "name another folder")
     return files, skipped
+
+
+def _is_result(path: Path) -> bool:
+    """Whether a mesh was written by ``shapeprog infer``, with the program beside it."""
+    return path.suffix == ".glb" and all(path.with_suffix(suffix).exists() for suffix in (".json", ".shape"))
 
 
 def _name(path: Path) -> str:

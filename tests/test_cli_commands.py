@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ import trimesh
 from commands import FRAME, PROGRAM, Run, table
 
 from shapeprog import inference
-from shapeprog.cli import main, terminal
+from shapeprog.cli import main, terminal, writing
+from shapeprog.data import load as load_shape
 from shapeprog.formats import export, load_with_frame
 
 
@@ -261,6 +263,28 @@ def test_a_folder_in_the_place_of_a_program_names_one_in_it(run: Run, tmp_path: 
     assert "such as folder/a.json" in run("export", "folder", "a.stl").err
 
 
+@pytest.mark.parametrize("name", ["cloud.npy", "cells.npy", "mesh.stl"])
+def test_the_input_is_shown_as_it_was_inferred(tmp_path: Path, name: str):
+    mesh = load_shape(table(tmp_path / "mesh.stl"))
+    np.save(tmp_path / "cloud.npy", mesh.points)
+    np.save(tmp_path / "cells.npy", mesh.voxels)
+    turned = load_shape(tmp_path / name, up="+y", front="-x")
+    for frame, size in ((turned.frame, 1), (replace(turned.frame, scale=2 * turned.frame.scale), 0.5)):
+        seen = writing._as_inferred(tmp_path / name, frame)
+        np.testing.assert_array_equal(seen.voxels, turned.voxels)
+        for one, other in ((seen.points, turned.points), (seen.vertices, turned.vertices)):
+            assert (one is None) == (other is None)
+            assert one is None or np.allclose(one, size * other, atol=1e-4)
+
+
+@pytest.mark.usefixtures("quick")
+def test_results_in_a_folder_of_inputs_are_no_inputs(run: Run, tmp_path: Path):
+    table(tmp_path / "table.glb")
+    for _ in range(2):
+        assert run("infer", ".", "--out", "res", "--no-picture").code == 0
+    assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["table.json"]
+
+
 def test_render_makes_pictures_and_export_cells_and_points(run: Run, tmp_path: Path, program: Path):
     table(tmp_path / "input.obj")
     assert run("render", program, "a.png", "--shape", "input.obj").code == 0
@@ -280,11 +304,16 @@ def test_show_and_sheet_write_a_page_and_a_picture(run: Run, tmp_path: Path, pro
     assert '"frame":"# placed: up ' in page, "what is copied keeps its way to the input"
     assert "pages end in .html" in run("show", program, "a.png").err
     (tmp_path / "cut.json").write_text(program.read_text()[:100])
+    assert "there is no folder table.json" in run("sheet", ".", "a.png", "--shape", program.name).err
+    assert "The input is not shown" in run("show", program, "--shape", ".").err
     ended = run("sheet", ".", "sheet.png")
     assert ended.code == 1
     assert "1 programs" in ended.out
     assert "was the file cut off?" in ended.err
     assert (tmp_path / "sheet.png").exists()
+    program.unlink()
+    ended = run("sheet", ".", "sheet.png")
+    assert (ended.code, "was the file cut off?" in ended.err) == (1, True)
 
 
 def test_statements_prints_the_manual(run: Run):

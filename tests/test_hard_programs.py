@@ -156,7 +156,7 @@ def test_the_input_is_opened_only_beside_its_program_or_where_the_user_says(
     path.write_text(program_to_json(PROGRAM, source=source.format(places)))
     opened: list[str] = []
     monkeypatch.setattr(data, "load", lambda place: opened.append(str(place)) or PLATE)
-    found, _ = writing._input_and_scores(path, None if named is None else places / named)
+    found, _ = writing._input_and_scores(path, None, None if named is None else places / named)
     assert (len(opened), found is not None) == ((1, True) if shown else (0, False))
 
 

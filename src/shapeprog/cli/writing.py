@@ -12,7 +12,7 @@ import typer
 from shapeprog.cli import terminal
 from shapeprog.cli.changes import CHANGE
 from shapeprog.cli.terminal import about_input
-from shapeprog.errors import OutputError, ShapeProgError
+from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def _draw(
     loaded, frame = terminal.read_program_file(program, changes)
     if not loaded.size:
         terminal.warn(program, "nothing is drawn: write a part below the size, such as box(height=2)")
-    shape, scores = _input_and_scores(program, named, changes)
+    shape, scores = _input_and_scores(program, frame, named, changes)
     if output.suffix.lower() in PAGES:
         viewer(loaded, output, shape=shape, title=program.stem, scores=scores, frame=frame)
     else:
@@ -176,17 +176,21 @@ def sheet_command(
     from shapeprog.view import Item, contact_sheet
     from shapeprog.view.page import scores_text
 
+    if shape is not None and not shape.is_dir():
+        raise InputError(f"there is no folder {shape}", "--shape takes the folder of the inputs")
     terminal.load_modules(modules)
     items: list[Item] = []
     failures: list[ShapeProgError] = []
     for path in program_files(folder)[:most]:
         try:
-            loaded, _ = terminal.read_program_file(path)
+            loaded, frame = terminal.read_program_file(path)
         except ShapeProgError as error:
             failures.append(error)
             continue
-        beside, scores = _input_and_scores(path, shape, noted=False)
+        beside, scores = _input_and_scores(path, frame, shape, noted=False)
         items.append(Item(path.stem, beside, loaded, scores_text(scores, loaded)[0]))
+    if not items:
+        terminal.finish(failures)
     contact_sheet(items, output, columns=columns, title=title)
     terminal.say(f"wrote {output}: {len(items)} programs")
     terminal.finish(failures)
@@ -210,7 +214,11 @@ def statements_command(
 
 
 def _input_and_scores(
-    program: Path, named: Path | None, changes: Sequence[str] | None = None, noted: bool = True
+    program: Path,
+    frame: Frame | None,
+    named: Path | None,
+    changes: Sequence[str] | None = None,
+    noted: bool = True,
 ) -> tuple[Shape | None, Mapping[str, float]]:
     """The input of a program and the scores in its .json file, unless ``--set`` changes it.
 
@@ -218,28 +226,38 @@ def _input_and_scores(
     the program, or in the folder that the user names and deeper: a program from elsewhere may name any file.  Where
     there is none, a remark is printed if ``noted``: a picture without the input is better than none.
     """
-    from shapeprog.data import load
     from shapeprog.formats.json_form import Result, read_result
     from shapeprog.language.program import Program
 
     kept = not changes and program.suffix.lower() == ".json"
     result = read_result(program) if kept else Result(Program())
     if named is not None and not named.is_dir():
-        return load(named), result.scores
+        return _as_inferred(named, frame), result.scores
     place, mark, member = (result.source or "").partition("#")
     files = program.parent.iterdir() if named is None else named.rglob("*")
     same = sorted(file for file in files if file.name == Path(place).name and file.is_file() and not file.is_symlink())
     try:
-        return _as_inferred(load(f"{same[0]}{mark}{member}"), result.frame), result.scores
+        return _as_inferred(f"{same[0]}{mark}{member}", frame), result.scores
     except (IndexError, ShapeProgError):
-        if noted and result.source:
-            terminal.note("The input is not shown: it was not found, or cannot be read. Give it with --shape.")
+        if noted and (result.source or named):
+            terminal.note("The input is not shown: it was not found, or cannot be read. Give its file with --shape.")
         return None, result.scores
 
 
-def _as_inferred(shape: Shape, frame: Frame | None) -> Shape:
+def _as_inferred(path: Path | str, frame: Frame | None) -> Shape:
     """A shape as it was seen when it was inferred, perhaps with --up or --front."""
-    if frame is None or shape.vertices is None:
-        return shape
-    seen = frame.to_grid(shape.frame.to_world(shape.vertices))
-    return replace(shape, vertices=seen.astype(shape.vertices.dtype))
+    import numpy as np
+
+    from shapeprog.data import load
+    from shapeprog.space import axis_name
+
+    if frame is None:
+        return load(path)
+    axes = np.asarray(frame.axes)
+    up, front = axis_name(axes[:, 0]), axis_name(-axes[:, 1])
+    shape = load(path) if up[1] == front[1] else load(path, up=up, front=front)  # a slanted frame turns no cells
+
+    def seen(positions: Any) -> Any:
+        return None if positions is None else frame.to_grid(shape.frame.to_world(positions)).astype(np.float32)
+
+    return replace(shape, vertices=seen(shape.vertices), points=seen(shape.points))

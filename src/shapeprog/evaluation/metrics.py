@@ -70,7 +70,7 @@ class Metrics:
     f1
         Share between 0 and 1.
     iou
-        Share between 0 and 1, of the snapped program.
+        Share between 0 and 1, of the cells of the program, see :func:`shapeprog.formats.samples.occupied`.
     blocks, statements, primitives
         Size of the program.
     numbers
@@ -266,7 +266,7 @@ def _distances(scene: Scene, target: Shape, points: int, seed: int) -> tuple[flo
         return float("nan"), float("nan"), float("nan"), float("nan")
     square = world_scale(target) ** 2
     floor = noise_floor(samples, square)
-    surface = _all_points(target, points) if _mesh(target) is None else samples[0]
+    surface = target_surface(target, samples, points)
     try:
         sampled = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
     except ShapeProgError:  # no primitive has a surface
@@ -287,7 +287,10 @@ def cloud_distances(sampled: Cloud, surface: Float[Tensor, "Q 3"], square: float
     return float(to_target.mean()) * square, float(from_target.mean()) * square, f1
 
 
-def _all_points(target: Shape, points: int) -> Cloud:
+def target_surface(target: Shape, samples: tuple[Cloud, Cloud], points: int) -> Cloud:
+    """The points that predictions are compared with: the first sampling of a mesh, or those of a cloud, undivided."""
+    if _mesh(target) is not None:
+        return samples[0]
     assert target.points is not None
     mixed = np.random.default_rng(0).permutation(len(target.points))[:points]  # files list them place after place
     return torch.from_numpy(np.asarray(target.points[np.sort(mixed)], np.float64))

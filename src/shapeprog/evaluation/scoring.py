@@ -23,6 +23,7 @@ from shapeprog.evaluation.metrics import (
     evaluate_program,
     noise_floor,
     target_samples,
+    target_surface,
     with_likeness,
     world_scale,
 )
@@ -40,8 +41,11 @@ Prediction = tuple[Program, Program | None, Frame | None] | Shape
 """A program with its whole-numbered form and its frame where the file holds them, or a shape."""
 
 
-def predictions(path: Path) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:
-    """Files, names and predictions of a file, a pack or a folder; a folder that holds programs is read for those."""
+def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:
+    """Files, names and predictions of a file, a pack or a folder; a folder that holds programs is read for those.
+
+    Of a cloud as many ``points`` are kept as are drawn on other surfaces.
+    """
     files = [path] if path.suffix.lower() in suffixes("program") else []
     if path.is_dir() and any(any(path.glob(f"*{suffix}")) for suffix in suffixes("program")):
         files = program_files(path)
@@ -54,7 +58,7 @@ def predictions(path: Path) -> Iterator[tuple[Path, str, Prediction | ShapeProgE
         else:
             yield file, file.stem, (result.program, result.snapped, result.frame)
     if not files:
-        for file, shape in load_all([path]):
+        for file, shape in load_all([path], points=points, seed=seed):
             yield file, (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
 
 
@@ -119,7 +123,7 @@ def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> 
     forward = backward = floor = f1 = math.nan
     if samples is not None and sampled is not None and len(sampled):
         cloud = torch.from_numpy(np.asarray(sampled, np.float64))
-        forward, backward, f1 = cloud_distances(cloud, samples[0], square)
+        forward, backward, f1 = cloud_distances(cloud, target_surface(target, samples, points), square)
         floor = noise_floor(samples, square)
     row = Metrics(target.name, forward + backward, forward, backward, floor, f1, iou, 0, 0, 0)
     return row if mesh is None else with_likeness(row, mesh, target, seed)

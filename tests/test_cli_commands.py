@@ -248,6 +248,21 @@ def test_export_replaces_no_other_program(run: Run, tmp_path: Path, program: Pat
     assert (tmp_path / "b.shape").read_text() == text
     assert not (tmp_path / "all.stl").exists()
     assert run("export", "a.shape", "b.shape", "--overwrite").code == 0
+    assert run("export", "a.shape", "a.json").code == 0
+    (tmp_path / "a.shape").write_text(text)
+    (tmp_path / "c.SHAPE").write_text(text)
+    made = "furniture_0.shape"
+    assert run("sample", "--count", 1, "--folder", ".").code == 0
+    for words, name in (
+        (["export", "a.json"], "a.shape"), (["export", "a.json"], "c.SHAPE"), (["tidy", "a.json"], "a.shape"),
+        (["library", "learn", "a.json", "--out"], "a.shape"), (["sample", "--count", 1, "--folder", "."], made),
+    ):  # fmt: skip
+        before = (tmp_path / name).read_text()
+        ended = run(*words, *([name] if name != made else []))
+        assert (ended.code, f"{name} exists" in ended.err) == (2, True), ended.err
+        assert (tmp_path / name).read_text() == before
+    assert run("sample", "--count", 1, "--folder", ".", "--overwrite").code == 0
+    assert run("tidy", "c.SHAPE", "c.SHAPE").code == 0, "a program may be replaced by itself"
 
 
 def test_a_share_of_a_span_for_one_copy_says_how_many_there_must_be(run: Run, tmp_path: Path):
@@ -334,6 +349,15 @@ def test_statements_of_a_users_own_come_with_an_option(run: Run, tmp_path: Path)
     ended = run("statements", "--with", "mine.py")
     assert ended.code == 2
     assert "mine.py, line 1" in ended.err
+
+
+def test_a_cloud_is_as_near_to_itself_as_can_be(run: Run, tmp_path: Path):
+    cloud = load_shape(table(tmp_path / "table.stl")).points
+    np.save(tmp_path / "cloud.npy", cloud[:1000])
+    ended = run("evaluate", "cloud.npy", "cloud.npy", "--json")
+    assert json.loads(ended.out)["rows"][0]["cd"] == 0
+    rows = [run("evaluate", "cloud.npy", "table.stl", "--json", "--points", n).out for n in (100, 1000)]
+    assert json.loads(rows[0])["rows"][0]["to_target"] != json.loads(rows[1])["rows"][0]["to_target"]
 
 
 def test_prepare_writes_packs(run: Run, tmp_path: Path):

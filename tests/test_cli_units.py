@@ -157,7 +157,7 @@ def test_tidy_keeps_the_unit_or_takes_another(run: Run, tmp_path: Path) -> None:
     there = in_unit(parse(NAMED), Unit("cm", 4))
     export(there, tmp_path / "table.shape", FRAME)
     for options, name in (((), "cm"), (("--unit", "mm"), "mm"), (("--unit", "cells"), "cells")):
-        ended = run("tidy", "table.shape", "out.shape", *options)
+        ended = run("tidy", "table.shape", "out.shape", *options, "--overwrite")
         assert ended.code == 0, ended.err
         found = load(tmp_path / "out.shape")
         assert ((found.unit.name if found.unit else "") or "cells") == name

@@ -103,6 +103,19 @@ def test_what_a_killed_writer_left_is_removed_when_the_folder_is_used_again(tmp_
     assert [path.name for path in tmp_path.iterdir()] == ["b.txt"]
 
 
+def test_files_of_the_user_are_neither_removed_nor_links_replaced(tmp_path):
+    (tmp_path / ".htaccess~").write_text("mine")
+    (tmp_path / "real").mkdir()
+    for link, target in (("a.txt", "real/a.txt"), ("new.txt", "real/new.txt")):
+        (tmp_path / link).symlink_to(tmp_path / target)
+    write_text(tmp_path / "real" / "a.txt", "old")
+    for link in ("a.txt", "new.txt"):
+        write_text(make_folder(tmp_path) / link, "new")
+        assert (tmp_path / link).is_symlink()
+        assert (tmp_path / "real" / link).read_text() == "new"
+    assert (tmp_path / ".htaccess~").read_text() == "mine"
+
+
 def test_lines_are_added_whole(tmp_path):
     for line in ("eins", "zwölf"):
         append_line(tmp_path / "a.txt", line)

@@ -36,7 +36,7 @@ _CURES = {
 }
 
 
-_UNFINISHED = ".????????~*"  # pattern of the names of temporary files
+_UNFINISHED = "." + 8 * "[0-9a-f]" + "~*"  # pattern of the names of temporary files
 
 
 @contextlib.contextmanager
@@ -52,7 +52,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     OutputError
         If the file cannot be written (full disk, no permission, missing folder...), with cause and remedy.
     """
-    target = Path(path)
+    target = Path(os.path.realpath(path) if os.path.islink(path) else path)  # a link stays one
     temporary = target.parent / f".{secrets.token_hex(4)}~{target.name[-200:]}"
     try:
         if target.is_dir():

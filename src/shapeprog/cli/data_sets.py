@@ -73,6 +73,7 @@ def sample_command(
         Path | None, typer.Option(metavar="FILE", help="Data set to write: voxels and points, .npz.")
     ] = None,
     points: Annotated[int, typer.Option(metavar="N", help="Surface points per shape in the data set.", min=0)] = 0,
+    overwrite: terminal.Overwrite = False,
 ) -> None:
     """Generate synthetic furniture as a contact sheet, as programs, or as a data set.
 
@@ -83,7 +84,7 @@ def sample_command(
     from shapeprog.data.synthetic import FURNITURE, furniture
 
     programs = [furniture(number, seed) for number in range(count)]
-    write_samples(FURNITURE, programs, seed, out=out, folder=folder, pack=pack, points=points)
+    write_samples(FURNITURE, programs, seed, out=out, folder=folder, pack=pack, points=points, overwrite=overwrite)
 
 
 def write_samples(
@@ -95,6 +96,7 @@ def write_samples(
     folder: Path | None = None,
     pack: Path | None = None,
     points: int = 0,
+    overwrite: bool = False,
 ) -> None:
     """Write programs of a prior as a sheet, a folder and a pack, as far as asked for; otherwise print them."""
     from shapeprog.data import write_pack
@@ -104,13 +106,16 @@ def write_samples(
     from shapeprog.view import Item, contact_sheet
 
     named = {f"{prior}_{number:0{len(str(len(programs) - 1))}d}": program for number, program in enumerate(programs)}
+    texts = {name: folder / f"{name}.shape" for name in named} if folder is not None else {}
+    terminal.check_free(texts.values(), overwrite)
     if out is not None:
         sizes = [f"{program.size} parts, {program.blocks} drawing statements" for program in programs]
         items = [Item(name, None, named[name], size) for name, size in zip(named, sizes, strict=True)]
         contact_sheet(items, out, columns=6, title=f"{prior}, seed {seed}")
     if folder is not None:
-        for name, program in named.items():
-            save(program, make_folder(folder) / f"{name}.shape")
+        make_folder(folder)
+        for name, path in texts.items():
+            save(named[name], path)
     if pack is not None:
         write_pack(pack, shapes_of(named, points, seed))
     files = [path for path in (out, folder, pack) if path is not None]
@@ -148,7 +153,8 @@ def evaluate_command(
     slivers         share of primitives thinner than .4% of the longest side
     part recall,    with --parts: parts that one primitive covers with IoU >= .5, and
     part precision  primitives that cover one part
-    IoU@32          of voxels, the numbers of the program rounded
+    IoU@32          of voxels that are touched; in the statements of the paper of the program rounded, for which
+                    evaluate the .json of infer --paper: the .shape holds no rounded form
     CD, F1@1cell    of 5,000 points; Chamfer distance with squared distances, both directions added, diagonal 1
     ... of the      the same measure between two samplings of the target, or two halves of its points: about what
     target itself   the best program reads. Halves have fewer points, so CD reads too high, F1 too low
@@ -170,7 +176,7 @@ def evaluate_command(
         raise InputError(f"there is no file or folder {absent[0]}", "check the path")
     files = part_files(parts) if parts else {}
     shapes, failures = scoring.read_targets(targets, up, front, points, seed)
-    listed = list(scoring.predictions(predictions))
+    listed = list(scoring.predictions(predictions, points, seed))
     rows: list[Metrics] = []
     hidden = terminal.quiet or as_json
     for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=hidden):

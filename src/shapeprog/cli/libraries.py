@@ -22,6 +22,7 @@ def learn_command(
     most: Annotated[int, typer.Option(metavar="N", help="Maximum number of functions.", min=1, max=100)] = 12,
     sheet: Sheet = None,
     modules: terminal.With = None,
+    overwrite: terminal.Overwrite = False,
 ) -> None:
     """Learn the functions that shorten a collection of programs most.
 
@@ -36,6 +37,7 @@ def learn_command(
     from shapeprog.language.ast import Comment
     from shapeprog.library import learn, save_library
 
+    terminal.check_free([out], overwrite)
     terminal.load_modules(modules)
     paths = [path for folder in folders for path in ([folder] if folder.is_file() else program_files(folder))]
     programs = [terminal.read_program_file(path)[0] for path in paths]

@@ -8,7 +8,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from shapeprog.arguments import MOST_SEED
-from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.errors import InputError, OutputError, ShapeProgError
 from shapeprog.files import output_error
-from shapeprog.formats.format import CELLS
+from shapeprog.formats.format import CELLS, suffixes
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -78,6 +78,7 @@ FileUnit = Annotated[
     str | None,
     about_input("--file-unit", metavar="UNIT", help="Unit of the input file: mm, cm, m or in. Default: m, up to 10 m."),
 ]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing program files.")]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -238,6 +239,14 @@ def assumed(frame: Frame, unit: str = "") -> str:
     unit = unit or assumed_unit(longest)
     message = f"The unit of the file is assumed to be {unit}, so that the longest side is"
     return f"{message} {longest * metres(unit):.3g} m. Another unit: --file-unit {'cm' if unit == 'mm' else 'mm'}"
+
+
+def check_free(paths: Iterable[Path], overwrite: bool, own: Path | None = None) -> None:
+    """Refuse to replace programs other than ``own``, the one that is read, unless ``overwrite``."""
+    for path in paths if not overwrite else ():
+        if path.suffix.lower() in suffixes("program") and path.is_file() and not (own and path.samefile(own)):
+            what = f"is another program than {own}" if own else "is a program"
+            raise OutputError(f"{path} exists and {what}", "name another file, or replace it with --overwrite")
 
 
 def load_modules(modules: Sequence[Path] | None) -> None:

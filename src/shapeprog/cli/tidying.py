@@ -24,6 +24,7 @@ def tidy_command(
     library: terminal.WithLibrary = False,
     modules: terminal.WithLibraries = None,
     seed: terminal.Seed = 0,
+    overwrite: terminal.Overwrite = False,
 ) -> None:
     """Replace numbers of a program that follow from others by names and expressions.
 
@@ -43,6 +44,7 @@ def tidy_command(
     from shapeprog.library import joined, with_library
 
     terminal.check_units(unit, file_unit, needed=True)
+    terminal.check_free([out] if out else [], overwrite, program)
     libraries = terminal.load_libraries(modules, library)
     given, frame = terminal.read_program_file(program)
     if not given.size:

@@ -48,7 +48,7 @@ def export_command(
         bool | None,
         terminal.about_input("--on-input/--upright", help="Lie on the input. Default: .glb .obj .ply and samples."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing program files.")] = False,
+    overwrite: terminal.Overwrite = False,
 ) -> None:
     """Export a program as a mesh, CAD file, voxels, points, or in another program format.
 
@@ -70,10 +70,7 @@ def export_command(
         if "=" in path.name and CHANGE.fullmatch(str(path)) and format_of(path) is None:
             raise OutputError(f"{path} is no file to write", f"changes of numbers follow --set: --set {path}")
     formats = [written_format(path) for path in outputs]
-    for path in outputs:
-        if path.suffix == program.suffix and path.is_file() and not overwrite and not path.samefile(program):
-            cure = "give one program, then the files to write; --overwrite replaces existing programs"
-            raise OutputError(f"{path} exists and is another program than {program}", cure)
+    terminal.check_free(outputs, overwrite, program)
     loaded, frame = terminal.read_program_file(program, changes)
     makers = any(chosen.maker for chosen in formats)
     known = file_unit is not None or (loaded.unit is not None and loaded.unit.name)

@@ -55,7 +55,7 @@ def tidy_command(
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
     if any(getattr(line, "text", "") or getattr(line, "note", "") for line in lines):  # a comment, or a line with one
         terminal.warn(program, "its comments are left out")
-    wanted = asked_unit(given, frame, unit, file_unit, program)
+    wanted = asked_unit(given, frame, unit, file_unit or "", program)
     result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
     if libraries:
         result = with_library(result, joined(libraries))

@@ -44,6 +44,7 @@ _ENTRIES = re.compile(
     rf"1 unit *= *({_NUMBER})(?: +[a-z]+)?\s*"
 )
 
+_UNKNOWN = "the size of the object is unknown"
 _CURE = "infer it with --unit, or write its unit at the top, as in '# unit: cm'"
 _ALIGNED = 1e-9  # largest difference of a direction from the axis as which it is written
 _ROUNDED = 1e-7  # share of the longest side by which the origin of a text is rounded
@@ -125,69 +126,48 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
     """The size of a cell in a file, and the unit that it is in, empty if it is not known."""
     if unit == CELLS:
         return 1.0, ""
-    own, known = program.unit, _named(program, file_unit)
-    per_cell = 1.0 if own is None else own.per_cell
-    if frame is None:
-        known = known or file_unit
-    if program.scale is not None:
-        per_cell = 1 / program.scale.cells_per_unit  # not rounded
+    per_cell, known = _real_size(program, frame, file_unit)
     wanted = unit or chosen.unit
     if wanted == "text":
-        wanted = known or ("" if frame is None else "mm")
+        wanted = known if frame is None or (program.unit and program.unit.name) else "mm"
     if not wanted:
         return (per_cell, known) if frame is None else (frame.scale, "")
-    if frame is not None and not known:
-        per_cell, known = frame.scale, file_unit or assumed_unit(SPAN * frame.scale)
     if known:
         return per_cell * (metres(known) / metres(wanted)), wanted
     if unit:
-        message = f"cannot write {' '.join(chosen.suffixes)} in {unit}: the size of the object is unknown"
-        raise InputError(message, _CURE)
+        raise InputError(f"cannot write {' '.join(chosen.suffixes)} in {unit}: {_UNKNOWN}", _CURE)
     return per_cell, ""
 
 
-def _named(program: Program, file_unit: str) -> str:
-    """The name of the unit in a program, or empty; an ``InputError`` if it has one, and ``file_unit`` is given too."""
-    known = "" if program.unit is None else program.unit.name
-    if known and file_unit:
-        message = f"--file-unit {file_unit} has no effect: the program states its unit, {known}"
-        raise InputError(message, f"leave it out, or correct the line '# unit: {known}'")
-    return known
+def _real_size(program: Program, frame: Frame | None, file_unit: str) -> tuple[float, str]:
+    """The size of a cell of the object, and its unit, empty if it is not known; ``file_unit`` is that of the input, or
+    without a frame that of the program."""
+    own, stated = program.unit, "" if program.unit is None else program.unit.name
+    if stated and file_unit:
+        message = f"--file-unit {file_unit} has no effect: the program states its unit, {stated}"
+        raise InputError(message, f"leave it out, or correct the line '# unit: {stated}'")
+    if frame is not None and not stated:
+        return frame.scale, file_unit or assumed_unit(SPAN * frame.scale)
+    per_cell = 1.0 if own is None else own.per_cell
+    if program.scale is not None:
+        per_cell = 1 / program.scale.cells_per_unit  # not rounded
+    return per_cell, stated or file_unit
 
 
-def asked_unit(
-    program: Program, frame: Frame | None, unit: str | None, file_unit: str | None, path: Path | str
-) -> Unit | None:
-    """The unit in which a program is asked for, or that in which it is already.
+def asked_unit(program: Program, frame: Frame | None, unit: str | None, file_unit: str, path: Path) -> Unit | None:
+    """The unit ``unit`` of the object that is written to ``path``, ``None`` for cells; without one that of the program.
 
-    Parameters
-    ----------
-    program, frame
-        The program, and the map from the grid to the coordinates of its input, if it is known.
-    unit, file_unit
-        The unit that is asked for, or ``cells``, and that of the file.
-    path
-        What is written, for errors.
-
-    Raises
-    ------
-    InputError
-        If the size of the object is not known, or stated twice.
+    ``file_unit`` is as for :func:`placement`; an ``InputError`` if the size of the object is not known.
     """
-    own = program.unit
     if unit is None:
-        return own
+        return program.unit
     if unit == CELLS:
         return None
-    if _named(program, file_unit or ""):
-        assert own is not None
-        return own.to(unit)
-    if frame is not None:
-        return Unit.of(frame, unit, file_unit or "")
-    if own is not None and file_unit:
-        return Unit(file_unit, own.per_cell).to(unit)
-    in_cells = f"statements in cells have no size: infer the object with --unit {unit}"
-    raise InputError(f"cannot write {path} in {unit}: the size of its cells is unknown", _CURE if own else in_cells)
+    per_cell, known = _real_size(program, frame, file_unit)
+    if not known:
+        in_cells = f"statements in cells have no size: infer the object with --unit {unit}"
+        raise InputError(f"cannot write {path} in {unit}: {_UNKNOWN}", _CURE if program.unit else in_cells)
+    return Unit(unit, per_cell * metres(known) / metres(unit))
 
 
 def _ground(program: Program, rests: bool) -> FloatArray:

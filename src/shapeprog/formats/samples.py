@@ -30,20 +30,7 @@ def occupied(
 
     Those of the whole-numbered program, as published, if all statements are of the kind that generators are taught: by
     default of the program rounded.  Of others, whose parts may be thinner than a cell, those that the solid touches.
-
-    Parameters
-    ----------
-    program, scene
-        The program, and what it draws.
-    snapped
-        Its whole-numbered form, if it has one.
-    resolution
-        Cells along each side.
-
-    Raises
-    ------
-    ShapeProgError
-        As for :func:`shapeprog.geometry.mesh.part_meshes`.
+    Raises what :func:`shapeprog.geometry.mesh.part_meshes` does.
     """
     if snapped is not None or all(language()[node.name].taught for node in program.walk()):
         return cells.rasterise(unroll(program.snap() if snapped is None else snapped), resolution)

@@ -29,13 +29,13 @@ from shapeprog.space import SIDE
 
 @statement("box", id=64, taught=False, hint=hints.upright_box)
 def box(at: Position, size: Extent) -> Solids:
-    """An upright box from its low, front, left corner."""
+    """An upright box from its low front right corner."""
     return shapes.box(at, size)
 
 
 @statement("board", id=65, taught=False, hint=hints.tilted_board)
 def board(at: Position, size: Extent, tilt: Angle) -> Solids:
-    """A board from the low, front, left corner that it has upright, then leaned to the rear by ``tilt`` degrees
+    """A board from the low front right corner that it has upright, then leaned to the rear by ``tilt`` degrees
     about its bottom front edge."""
     return shapes.tilted_box(at, size, tilt)
 
@@ -73,13 +73,13 @@ def bent_rod(start: Position, through: Position, end: Position, radius: Radius) 
 
 @statement("cushion", id=71, taught=False, hint=hints.rounded)
 def cushion(at: Position, size: Extent, edge: Radius) -> Solids:
-    """A box with rounded edges, from its low, front, left corner; ``edge`` is the radius of the edges."""
+    """A box with rounded edges, from its low front right corner; ``edge`` is the radius of the edges."""
     return shapes.rounded_box(at, size, edge)
 
 
 @statement("leaning_box", id=72, taught=False, hint=hints.never)
 def leaning_box(at: Position, size: Extent, lean: Shift) -> Solids:
-    """A box from its low, front, left corner, whose top is shifted to the rear by ``lean`` (a shear)."""
+    """A box from its low front right corner, whose top is shifted to the rear by ``lean`` (a shear)."""
     return shapes.leaning_box(at, size, lean)
 
 

@@ -38,7 +38,7 @@ def cuboid(centre: Vector, half: Vector, lean: Scalar | None = None) -> Solids:
 
 
 def box(corner: Vector, extent: Vector) -> Solids:
-    """A cuboid from its low, front, left corner and its full extents."""
+    """A cuboid from its low front right corner and its full extents."""
     return cuboid(corner + extent / 2, extent / 2)
 
 
@@ -66,14 +66,14 @@ def cone_between(start: Vector, end: Vector, radii: Pair) -> Solids:
 
 
 def tilted_box(at: Vector, size: Vector, tilt: Scalar) -> Solids:
-    """A cuboid from its low, front, left corner, turned to the rear by ``tilt`` degrees about its bottom front edge."""
+    """A cuboid from its low front right corner, turned to the rear by ``tilt`` degrees about the bottom front edge."""
     rotation = about_axis(torch.full_like(tilt, SIDE, dtype=torch.long), tilt)
     half = size / 2
     return solid(CUBOID, at + (rotation @ half[..., None])[..., 0], *half.unbind(-1), rotation=rotation)
 
 
 def leaning_box(at: Vector, size: Vector, lean: Scalar) -> Solids:
-    """A cuboid from its low, front, left corner, whose top is shifted to the rear by ``lean``."""
+    """A cuboid from its low front right corner, whose top is shifted to the rear by ``lean``."""
     shift = torch.stack([torch.zeros_like(lean), lean / 2, torch.zeros_like(lean)], -1)
     return cuboid(at + size / 2 + shift, size / 2, lean=lean)
 
@@ -114,7 +114,7 @@ def arc_through(start: Vector, through: Vector, end: Vector, radius: Scalar) -> 
 
 
 def rounded_box(at: Vector, size: Vector, edge: Scalar) -> Solids:
-    """A box from its low, front, left corner, with edges rounded to the radius ``edge``."""
+    """A box from its low front right corner, with edges rounded to the radius ``edge``."""
     return solid(ROUNDED_BOX, at + size / 2, *(size / 2).unbind(-1), edge)
 
 

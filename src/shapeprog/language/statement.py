@@ -2,7 +2,7 @@
 
     @statement("leg", id=1, paper=("Leg", "Cub"))
     def leg(at: Position, size: Extent) -> Solids:
-        "A leg: an upright board or post from its low, front, left corner."
+        "A leg: an upright board or post from its low front right corner."
         return box(at, size)
 
 From the signature follow syntax, printing, tensor slots, sampling range, legality, execution and the manual.

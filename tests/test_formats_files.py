@@ -87,6 +87,13 @@ def test_stl_is_one_watertight_solid_without_inner_walls(tmp_path: Path):
     assert overlap > 0
 
 
+def test_stl_has_no_triangle_whose_corners_coincide(tmp_path: Path):
+    path = export(PROGRAM, tmp_path / "far.stl", Frame(centre=(1e7, 0, 0), scale=0.4), on_input=True)
+    corners = trimesh.load(path, process=False).triangles
+    assert len(corners) > 20
+    assert (corners != np.roll(corners, 1, 1)).any(2).all()
+
+
 def test_glb_names_and_colours_every_part(tmp_path: Path):
     scene = trimesh.load(export(PROGRAM, tmp_path / "table.glb", FRAME))
     names = ["top_rectangle_1", "leg_1", "leg_2", "leg_3", "leg_4", "line_1"]

@@ -146,7 +146,8 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
         if suffix.removeprefix(".") not in COMMON and suffix not in readable_suffixes():
             suffixes = ", ".join(sorted(readable_suffixes()))
             ending = f"that end in {suffix!r}" if suffix else "without a suffix"
-            raise InputError(f"{path.name}: no shapes are read from files {ending}", f"known: {suffixes}")
+            cure = "pip install lxml networkx" if suffix == ".3mf" else f"known: {suffixes}"
+            raise InputError(f"{path.name}: no shapes are read from files {ending}", cure)
         axes_of(path, up, front)  # wrong axes are reported before the file is read
         make_shape, name = partial(_placed, path, up, front), _name(path)
         if suffix in ARRAY_SUFFIXES:

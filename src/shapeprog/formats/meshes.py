@@ -97,7 +97,10 @@ def stl(program: Program, frame: Frame) -> bytes:
     """The union of all parts as one watertight solid, ready to print."""
     import trimesh
 
-    mesh: Any = trimesh.Trimesh(*solid(program, frame), process=False)
+    vertices, faces = solid(program, frame)
+    corners = vertices.astype(np.float32)[faces]
+    kept = (corners != np.roll(corners, 1, 1)).any(2).all(1)  # STL has no vertices: corners that coincide are one
+    mesh: Any = trimesh.Trimesh(vertices, faces[kept], process=False)
     return mesh.export(file_type="stl")
 
 

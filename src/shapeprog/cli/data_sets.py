@@ -70,7 +70,7 @@ def sample_command(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Contact sheet to write, such as sheet.png.")] = None,
     folder: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder for a .shape file of each.")] = None,
     pack: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Data set to write: voxels and points, .npz.")
+        Path | None, typer.Option(metavar="FILE", help="Data set to write, .npz: voxels, and points with --points.")
     ] = None,
     points: Annotated[int, typer.Option(metavar="N", help="Surface points per shape in the data set.", min=0)] = 0,
     overwrite: terminal.Overwrite = False,
@@ -197,6 +197,8 @@ def evaluate_command(
         for error in failures:
             terminal.complain(error)
         raise InputError("no prediction could be measured", "predictions and targets are matched by name")
+    if files and (bare := [name for name in shapes if name not in files]):
+        terminal.note(f"No parts of {len(bare)} of {len(shapes)} targets, such as {bare[0]}, are in {parts}", "yellow")
     missing_names = [name for name in shapes if name not in {row.name for row in rows}]
     summary = summarise(rows)
     if not any(row.blocks for row in rows):

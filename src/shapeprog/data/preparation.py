@@ -154,6 +154,9 @@ def find_models(directory: Path, skipped: Skipped) -> list[tuple[str, str, Path]
     folders = [path for path in entries(directory, skipped) if is_folder(path, skipped)]
     for branch in [*folders, directory.resolve()]:
         if models and branch not in folders:
+            stray = [path for path in entries(branch, skipped) if path.suffix.lower() in suffixes and path.is_file()]
+            error = InputError("it lies in no folder of a category, as other models do", "move it into one")
+            skipped += [(path, error) for path in stray]
             break
         category = SYNSETS.get(branch.name, re.sub(r"[^\w-]+", "_", branch.name))
         closed: Skipped = []

@@ -364,8 +364,10 @@ def test_prepare_writes_packs(run: Run, tmp_path: Path):
     (tmp_path / "in" / "table").mkdir(parents=True)
     table(tmp_path / "in" / "table" / "one.obj")
     (tmp_path / "in" / "table" / "two.obj").write_text("broken")
+    table(tmp_path / "in" / "stray.obj")
     ended = run("prepare", "in", "packs")
     assert ended.code == 1
+    assert "stray.obj: it lies in no folder of a category" in ended.err
     assert "1 shapes" in ended.out
     assert "two.obj" in ended.err
     assert "Few shapes, so scores on them say little: table_" in ended.err
@@ -408,6 +410,8 @@ def test_evaluate_tells_how_many_physical_parts_have_a_primitive_of_their_own(ru
     assert ended.code == 0, ended.err
     row = json.loads(ended.out)["rows"][0]
     assert (row["part_recall"], row["part_precision"]) == (1, 1)
+    ended = run("evaluate", "table.json", table(tmp_path / "other.obj"), "--parts", "parts")
+    assert "No parts of 1 of 1 targets, such as other, are in parts" in ended.err
     (folder / "0.ply").write_text("ply")
     ended = run("evaluate", "table.json", "kitchen_table.obj", "--parts", "parts")
     assert (ended.code, "prediction table: 0.ply" in ended.err) == (1, True)
@@ -464,6 +468,18 @@ def test_mistakes_are_told_without_a_traceback(run: Run, tmp_path: Path, program
     assert told in ended.err
     assert "error: " in ended.err
     assert "Traceback" not in ended.err
+
+
+def test_export_ends_as_a_failure_if_one_file_is_written_and_as_a_mistake_if_none_is(run: Run, program: Path):
+    assert [run("export", program, name, "no/a.stl").code for name in ("a.stl", "no/b.stl")] == [1, 2]
+
+
+def test_units_of_statements_in_cells_and_readers_that_are_not_installed_are_told(run: Run, tmp_path: Path):
+    table(tmp_path / "a.obj")
+    (tmp_path / "a.3mf").write_text("")
+    for words, told in ((["a.obj", "--paper", "--unit", "cm"], "--paper"), (["a.3mf"], "pip install lxml networkx")):
+        ended = run("infer", *words)
+        assert (ended.code, told in ended.err) == (2, True), ended.err
 
 
 @pytest.mark.parametrize("seed", [-1, 2**32])

@@ -89,11 +89,11 @@ def _options(
         bool | None, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error; of every command.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; of every command.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, warnings and tables.")] = False,
 ) -> None:
     """Infer short, editable programs from furniture given as meshes, point clouds or voxels.
 
     Example: shapeprog infer chair.glb --out results
 
-    Exit codes: 0 success, 1 some of several inputs failed, 2 wrong usage or input, 130 interrupted.
+    Exit codes: 0 success, 1 some of several inputs or outputs failed, 2 wrong usage or input, 130 interrupted.
     """

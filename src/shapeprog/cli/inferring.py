@@ -14,6 +14,7 @@ import typer
 from shapeprog.cli import terminal
 from shapeprog.cli.terminal import about_program, about_search
 from shapeprog.errors import InputError, OutputError, ShapeProgError
+from shapeprog.formats.format import CELLS
 from shapeprog.inference.budget import BUDGET
 
 if TYPE_CHECKING:
@@ -74,6 +75,8 @@ def infer_command(
 
     terminal.check_axes(up, front)
     terminal.check_units(unit, file_unit)
+    if paper and unit not in (None, CELLS):
+        raise InputError(f"--unit {unit} has no effect on --paper", "its statements are in cells; leave one out")
     report = None if as_json else lambda sentence: terminal.note(f"{sentence.capitalize()}.")
     others = ["geometry/voxelise", "geometry/neighbour", "evaluation/", *([] if no_picture else ["view/"])]
     prepare(modules_of(*SURFACE_KERNELS, *others), report)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from shapeprog.space import Frame
 
 debugging = False  # whether errors show their traceback
-quiet = False  # whether errors alone are printed
+quiet = False  # whether remarks, and what was written, are not printed
 WIDTH = 120  # columns of a table where the output is no terminal
 FAILED, MISTAKE, INTERRUPTED = 1, 2, 130  # exit codes
 
@@ -71,7 +71,7 @@ Seed = Annotated[int, typer.Option(metavar="N", help="Seed of all random numbers
 AsUnit = Annotated[
     str | None,
     about_program(
-        "--unit", metavar="UNIT", help="mm, cm, m, in, or cells (24 = the longest side). Default: that of the input."
+        "--unit", metavar="UNIT", help="mm, cm, m, in, or cells (24 = longest side). Default: of the input or format."
     ),
 ]
 FileUnit = Annotated[
@@ -181,12 +181,12 @@ def complain(error: ShapeProgError) -> None:
         console.print(f"hint: {error.hint}")
 
 
-def finish(failures: Sequence[ShapeProgError]) -> None:
-    """Print errors, and end with the exit code of a failure if there are some."""
+def finish(failures: Sequence[ShapeProgError], code: int = FAILED) -> None:
+    """Print errors, and end with an exit code if there are some."""
     for error in failures:
         complain(error)
     if failures:
-        raise typer.Exit(FAILED)
+        raise typer.Exit(code)
 
 
 def at(path: Path, error: ShapeProgError) -> ShapeProgError:

@@ -87,10 +87,7 @@ def export_command(
         terminal.say(f"wrote {path}")
         if path.suffix.lower() == ".csv":
             terminal.say(cut_table(loaded, frame, **asked))
-    for failure in failures[:-1]:
-        terminal.complain(failure)
-    if failures:
-        raise failures[-1]
+    terminal.finish(failures, terminal.FAILED if len(failures) < len(outputs) else terminal.MISTAKE)
 
 
 def render_command(

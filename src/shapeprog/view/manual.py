@@ -7,7 +7,7 @@ from pathlib import Path
 
 from shapeprog.errors import ShapeProgError, did_you_mean
 from shapeprog.language.parameters import Parameter
-from shapeprog.language.placement import BETWEEN, BOX, GROUPS, IN_BOX, ROUND_ROLES
+from shapeprog.language.placement import BETWEEN, BOX, GROUPS, IN_BOX, ROUND_ROLES, SIZES
 from shapeprog.language.statement import Role, Statement, language
 
 _SOLIDS = (*IN_BOX, "bar", "bent_rod")
@@ -57,7 +57,7 @@ def _placed_page(name: str) -> str:
         needed = [needs[name] for needs in (IN_BOX, BETWEEN) if name in needs]
         keywords = tuple(dict.fromkeys(word for needs in needed for word in (*needs.required, *needs.optional)))
         keywords = (*(BOX if name in IN_BOX else ()), *keywords)
-        example = f"{name}({', '.join(f'{word}=_' for word in needed[0].required or BOX[:3])})"
+        example = f"{name}({', '.join(f'{word}=_' for word in needed[0].required or ('left', *SIZES[::2]))})"
     plain = " ".join(word for word in keywords if word not in _DOCS)
     placed = [f"  {plain}"] if plain else []
     words = _table({word: _DOCS[word] for word in keywords if word in _DOCS})

@@ -208,11 +208,7 @@ def statements_command(
 
 
 def _input_and_scores(
-    program: Path,
-    frame: Frame | None,
-    named: Path | None,
-    changes: Sequence[str] | None = None,
-    noted: bool = True,
+    program: Path, frame: Frame | None, named: Path | None, changes: Sequence[str] | None = None, noted: bool = True
 ) -> tuple[Shape | None, Mapping[str, float]]:
     """The input of a program and the scores in its .json file, unless ``--set`` changes it.
 

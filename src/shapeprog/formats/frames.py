@@ -142,15 +142,13 @@ def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str,
 def _real_size(program: Program, frame: Frame | None, file_unit: str) -> tuple[float, str]:
     """The size of a cell of the object, and its unit, empty if it is not known; ``file_unit`` is that of the input, or
     without a frame that of the program."""
-    own, stated = program.unit, "" if program.unit is None else program.unit.name
+    unit, scale, stated = program.unit, program.scale, "" if program.unit is None else program.unit.name
     if stated and file_unit:
         message = f"--file-unit {file_unit} has no effect: the program states its unit, {stated}"
         raise InputError(message, f"leave it out, or correct the line '# unit: {stated}'")
     if frame is not None and not stated:
         return frame.scale, file_unit or assumed_unit(SPAN * frame.scale)
-    per_cell = 1.0 if own is None else own.per_cell
-    if program.scale is not None:
-        per_cell = 1 / program.scale.cells_per_unit  # not rounded
+    per_cell = 1 / scale.cells_per_unit if scale else unit.per_cell if unit else 1.0  # the first is not rounded
     return per_cell, stated or file_unit
 
 

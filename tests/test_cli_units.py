@@ -189,7 +189,7 @@ def test_parts_that_round_to_nothing_are_told(run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.shape").write_text(
         "# unit: mm\nwidth, depth, height = 4, 4, 4\nback(front=0, depth=0.02)\nleg(width=1)"
     )
-    assert "1 part is left out: thinner than 0.05 mm" in run("export", "a.shape", "a.csv").out
+    assert "parts thinner than 0.05 mm are left out (wrong unit?): 1" in run("export", "a.shape", "a.csv").out
 
 
 @pytest.mark.parametrize(

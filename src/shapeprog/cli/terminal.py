@@ -245,8 +245,7 @@ def check_free(paths: Iterable[Path], overwrite: bool, own: Path | None = None) 
     """Refuse to replace programs other than ``own``, the one that is read, unless ``overwrite``."""
     for path in paths if not overwrite else ():
         if path.suffix.lower() in suffixes("program") and path.is_file() and not (own and path.samefile(own)):
-            what = f"is another program than {own}" if own else "is a program"
-            raise OutputError(f"{path} exists and {what}", "name another file, or replace it with --overwrite")
+            raise OutputError(f"{path} exists and is a program", "name another file, or replace it with --overwrite")
 
 
 def load_modules(modules: Sequence[Path] | None) -> None:

@@ -95,8 +95,7 @@ class CutList(NamedTuple):
             copies = f"{self.coinciding} copies lie" if self.coinciding > 1 else "1 copy lies"
             lines.append(f"Warning: {copies} where another one lies (a mirror through the part?).")
         if self.dropped:
-            parts = f"{self.dropped} parts are" if self.dropped > 1 else "1 part is"
-            lines.append(f"Warning: {parts} left out: thinner than {500 * FINEST:g} mm (is the unit right?).")
+            lines.append(f"Warning: parts thinner than {500 * FINEST:g} mm are left out (wrong unit?): {self.dropped}")
         return "\n".join(lines)
 
 

@@ -174,8 +174,7 @@ def joined(meshes: Sequence[tuple[Array, Array]]) -> Triangles:
     """Vertices (V, 3) and faces (F, 3) of meshes as those of one, in their order."""
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
     faces = [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
-    points = [np.empty((0, 3)), *(vertices for vertices, _ in meshes)]
-    return np.concatenate(points).astype(np.float64), np.concatenate([np.empty((0, 3), np.int64), *faces])
+    return np.concatenate([np.empty((0, 3)), *(v for v, _ in meshes)]), np.concatenate([np.empty((0, 3), int), *faces])
 
 
 def pieces(vertices: Array, faces: Array) -> int:

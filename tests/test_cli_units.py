@@ -212,6 +212,7 @@ def test_parts_that_round_to_nothing_are_told(run: Run, tmp_path: Path) -> None:
 def test_units_that_cannot_be_are_told(run: Run, tmp_path: Path, words: list[str], told: str) -> None:
     table(tmp_path / "table.obj")
     (tmp_path / "legs.shape").write_text(NAMED)
+    (tmp_path / "cells.shape").write_text("leg(at=(0, 0, 0), size=(1, 1, 1))")
     export(parse(NAMED.replace("x=span", "x=span, y=n")), tmp_path / "mixed.shape", FRAME)
     (tmp_path / "cm.shape").write_text(f"# placed: up y, front z, origin 0 0 0, 1 unit = 0.01\n# unit: cm\n{NAMED}")
     (tmp_path / "bad.shape").write_text(

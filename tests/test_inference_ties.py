@@ -90,6 +90,36 @@ def test_a_wider_table_keeps_its_contacts_its_symmetry_and_is_one_piece():
     assert edit_scores(sp.parse(TABLE)).contacts < 0.9
 
 
+def test_cushions_keep_their_thickness_in_a_higher_sofa():
+    program = sp.parse("""
+cushion(box(at=(0.1, -4.8, -11.76), size=(1.7, 9.6, 23.53)))
+for i in mirror(side):
+    for j in mirror(depth):
+        foot(cylinder(at=(-3.72, -4.2, 11.16), height=2.7, radius=0.35))
+    arm(rod(start=(2.74, 4.56, 10.56), end=(2.75, -4.56, 10.56), radius=0.97))
+seat(box(at=(-1.08, -5.04, -12), size=(1.2, 10.08, 24)))
+""")
+    tied = tie(program, evidence_of_program(program))
+    high = sp.set(tied, height=1.3 * next(named.value for named in sp.names(tied) if named.name == "height"))
+    assert 2 * unroll(high).bounds[0, 0] == pytest.approx(1.7, abs=0.1)
+
+
+def test_what_fills_a_round_piece_needs_no_sides():
+    program = sp.parse(
+        "top(cylinder(at=(5, 0, 0), height=1, radius=12))\nleg(cylinder(at=(-5, 0, 0), height=10, radius=1))\n"
+    )
+    assert "top(cylinder(top=0, height=" in str(tie(program, evidence_of_program(program)))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_neighbours_in_rows_of_rows_divide_a_box_whichever_row_comes_first(turned):
+    rows = ["for i in translate(4, by=(6, 0, 0)):\n", "for j in translate(3, by=(0, 0, 8)):\n"]
+    first, second = reversed(rows) if turned else rows
+    panel = "panel(box(at=(-11.8, -3, -8), size=(5.6, 6, 0.4)))\n"
+    program = sp.parse(f"{first}    {second}        {panel}")
+    assert "for _ in divide(4, z, gap=" in str(tie(program, evidence_of_program(program)))
+
+
 BENCH = (
     TABLE
     + """

@@ -47,6 +47,7 @@ class _AxisAnchors:
         self.elements = [element for element in layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
+        self.thin = {element.line for element in self.elements if self._is_thickness(layout, element)}
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in self.elements]
         self.spans: list[tuple[int, int, float]] = []  # both ends of a rod, and the cost of different anchors
         for (line, key), end in index.items():
@@ -77,8 +78,17 @@ class _AxisAnchors:
         self.weights = TIES.side * (reaches | beyond)  # of faces that do not move
         self.overlap = self._overlaps(low, high)
 
+    def _is_thickness(self, layout: Layout, element: Element) -> bool:
+        """Whether a part is a board across the axis: a person expects it to keep its thickness."""
+        if element.key or layout.lines[element.line].kind == "divide":
+            return False
+        box = [layout.elements[element.line, "", axis] for axis in range(3)]
+        least, second, _ = sorted(each.high - each.low for each in box)
+        return element.high - element.low <= least <= TIES.board * second
+
     def _choices(self, element: Element) -> Sequence[Anchors]:
-        centred = abs(element.middle - self.extent / 2) < TIES.off_middle * self.extent and self.axis < 2
+        off = max(TIES.off_middle * self.extent, TIES.within * (element.kind != "interval"))
+        centred = abs(element.middle - self.extent / 2) < off and self.axis < 2
         if element.kind != "interval":
             if self.axis == 2 and element.key != "plane":
                 return [(LOW,), (HIGH,)]
@@ -115,6 +125,7 @@ class _AxisAnchors:
                 cost += TIES.from_top
         if len(set(anchors)) > 1:
             cost += TIES.resized * max(0.0, 1 - (element.high - element.low) / extent / TIES.spanning)
+            cost += TIES.thicker * (element.line in self.thin)
         return cost
 
     def solved(self) -> list[Anchors]:

@@ -86,7 +86,7 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
     """Number of operators of all different sums, and the cost of their repetitions."""
     used, negative = np.abs(factors) > NOTHING, factors < -NOTHING
     operators = np.maximum(used.sum(1) - 1, 0) + (used & (np.abs(np.abs(factors) - 1) > NOTHING)).sum(1)
-    operators = operators + 0.5 * negative.sum(1) + TIES.negative * (sizes & negative.any(1))  # sums rather
+    operators = operators + negative.sum(1) + TIES.negative * (sizes & negative.any(1))  # sums rather
     composite = np.flatnonzero(operators)
     _, first = np.unique(factors[composite].round(6), axis=0, return_index=True)
     return float(operators[composite[first]].sum() + TIES.repeated * (len(composite) - len(first)))

@@ -16,7 +16,7 @@ from shapeprog.language.convert.forms import cost
 from shapeprog.language.evaluate import placed_source, symbolic
 from shapeprog.language.expression import Expression
 from shapeprog.language.merging import merged_lines
-from shapeprog.language.placement import AXES, BOX, axis_of
+from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
@@ -113,6 +113,8 @@ def _same(line: Line, other: Line, numbers: dict[str, float]) -> bool:
     """Whether two lines draw the same statements whatever the numbers are: tried with irregular ones."""
     random = np.random.default_rng(0)
     changed = {name: (value or 0.1) * random.uniform(0.9, 1.1) for name, value in numbers.items()}
+    if "diameter" in changed:
+        changed |= dict.fromkeys(SIZES[:2], changed["diameter"])
     drawn: list[FloatArray] = []  # the values of all statements in cells
     for each in (line, other):
         source = placed_source((Assignment(tuple(numbers.items())), each))

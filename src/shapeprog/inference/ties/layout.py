@@ -59,10 +59,8 @@ class Layout:
         The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
     elements
         All elements, by line, key and axis.
-    slots, names
-        The numbers (P,), the three sizes of the whole first, and their names.
-    index
-        The number of every line and keyword.
+    slots, names, index
+        The numbers (P,), the three sizes of the whole first, their names, and that of every line and keyword.
     body, source
         The parts and loops with names, and the program of these.
     numbers
@@ -166,6 +164,9 @@ class Layout:
             case Group("translate", keywords, (Part("box" | "cushion") as part,), float(count)) if count > 1:
                 ways = ((axis_of(word), (count - 1) * float(step)) for word, step in keywords)  # type: ignore[arg-type]
                 moving = [(axis, way) for axis, way in ways if abs(way) >= TIES.touch]
+            case Group("translate", _, (Group("translate") as row,)):  # rows may be nested in either order
+                outer = self._divisions(replace(line, body=row.body))
+                return replace(row, body=(outer,)) if isinstance(outer, Group) and outer.kind == "divide" else line
             case Group("mirror", ((word, _),), (Part("box" | "cushion") as part,)) if axis_of(word) < 2:
                 axis, count = axis_of(word), 2.0
                 plane, _ = ends_of(line, "plane", axis, self._sizes)
@@ -179,12 +180,12 @@ class Layout:
         words, (low, high) = AXES[axis], ends_of(part, "", axis, self._sizes)
         size = high - low
         gap = abs(away) / (count - 1) - size
-        if not -min(TIES.within, TIES.gap * size) < gap <= TIES.gap * size:
+        if not -TIES.touch < gap <= TIES.gap * size:
             return line
         box = {word: value for word, value in given.items() if word in BOX and word not in words}
         box |= {words.low: low + min(away, 0.0), words.size: size + abs(away)}
-        inner = replace(part, keywords=tuple(pair for pair in part.keywords if pair[0] not in BOX))
-        return Group("divide", (*box.items(), ("gap", gap)), (inner,), count, "xyz"[axis])
+        part = replace(part, keywords=tuple(pair for pair in part.keywords if pair[0] not in BOX))
+        return Group("divide", (*box.items(), ("gap", gap)), (part,), count, "xyz"[axis])
 
     def _with_radius(self, line: Line) -> Line:
         """An upright round part with a radius in place of a width or depth; in the middle if it fills the whole."""

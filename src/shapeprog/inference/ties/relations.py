@@ -166,7 +166,8 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
         elif slot.kind == "gap" and abs(slot.value) <= TIES.touch:
             yield Relation(eye[k], TIES.equal)
         elif slot.kind == "offset":
-            yield Relation(eye[k], TIES.symmetric(slot.axis), limit=TIES.askew)
+            limit = TIES.plane if slot.word.startswith("plane") else TIES.askew
+            yield Relation(eye[k], TIES.symmetric(slot.axis), limit=limit)
         elif slot.kind == "angle" and slot.word != "step":
             yield Relation(eye[k], TIES.equal, limit=TIES.degrees)
     for (a, slot), (b, other) in combinations(enumerate(slots), 2):

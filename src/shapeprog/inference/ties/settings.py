@@ -34,7 +34,8 @@ class TieSettings:
 
     # By how much a relation may be off
     within: float = 0.3  # lengths
-    askew: float = 1.0  # equal clearances on both sides
+    plane: float = 0.1  # planes of mirrors off the middle
+    askew: float = 0.3  # equal clearances on both sides
     degrees: float = 2.0  # angles; also of bars about themselves whose sides follow those of the whole
     at_floor: float = 0.02  # share of the height of the whole up to which a part touches the floor
     alike: float = 0.25  # equal sizes, as a share of the larger
@@ -46,6 +47,7 @@ class TieSettings:
     touch: float = 0.12  # gap up to which they touch
     side: float = 2.0  # of a copy of a part near a side of the whole that does not move with it
     resized: float = 2.0  # of a short part that changes its size, times how much it is below ``spanning``
+    thicker: float = 6.0  # of a board that changes its thickness
     rigid: float = 5.0  # of a copy of a long part that keeps its size
     middle: float = 2.0  # of an end measured from the middle, where the middle of the part is not that of the whole
     farther: float = 3.0  # of an end measured from the farther of two sides, times how much farther, as a share
@@ -56,6 +58,7 @@ class TieSettings:
     reach: float = 0.02  # up to this a face reaches a side
     beyond: float = 0.3  # parts wholly beyond this share of the half are near that side
     below: float = 0.1  # parts whose top is so far below that of the whole are near the top
+    board: float = 0.4  # the thickness of a board is at most this share of its next longer side
     spanning: float = 0.6  # from this on parts are long
     growth: float = 0.25  # by which the whole grows to see what is separated
     off_middle: float = 0.02  # by which the middle of a part may miss that of the whole
@@ -76,7 +79,7 @@ class TieSettings:
 
     # Text
     negative: float = 1.5  # operators that a size is worth which may become negative: a difference
-    repeated: float = 0.3  # operators that every use of a sum after the first is worth, as it can be named
+    repeated: float = 0.1  # operators that every use of a sum after the first is worth, as it can be named
     upright: float = 0.12  # cells by which the ends of an upright part may be off its axis
     leaning: float = 1.0  # angle from which a board is written as a bar, which has no left and right side,
     board_off: float = 0.5  # if it is off the middle by no more than this

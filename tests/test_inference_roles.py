@@ -9,7 +9,7 @@ import torch
 import shapeprog as sp
 from shapeprog.geometry.primitives import primitives
 from shapeprog.inference.roles import roles
-from shapeprog.inference.roles.roles import in_order, separated, with_roles
+from shapeprog.inference.roles.roles import in_order, note_on_front, separated, with_roles
 from shapeprog.language.hints import Box, straight_bar, upright_box
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.statement import language
@@ -237,6 +237,19 @@ def test_copies_written_one_by_one_as_boxes_of_any_size_and_place_get_the_same_r
 def test_a_chair_has_the_same_parts_whichever_way_it_faces(text: str, turns: int) -> None:
     alone, block = copies(sp.parse(text), turns=turns)
     assert words(with_roles(alone)) == [wanted(text)[each] for each in block]
+
+
+@pytest.mark.parametrize(
+    ("side", "note"),
+    [("rear", ""), ("left", "on the left"), ("front", "in front"), ("right", "on the right"), ("bottom", "")],
+)
+def test_a_back_that_is_not_behind_is_noted(side: str, note: str) -> None:
+    size = "height" if side == "bottom" else "width" if side in ("left", "right") else "depth"
+    back = "" if side == "bottom" else "bottom=45, "
+    text = "width, depth, height = 50, 50, 90\nseat(bottom=40, height=5)\nfor _ in mirror(x=0, y=0):\n    "
+    text += f"leg(left=0, width=4, front=0, depth=4, height=40)\nblock({back}{side}=0, {size}=4)\n"
+    assert note in (told := note_on_front(sp.parse(text)))
+    assert bool(note) == bool(told)
 
 
 def test_a_low_board_at_the_foot_of_a_bed_is_its_footboard_too() -> None:

@@ -31,7 +31,7 @@ from shapeprog.inference.cells.reconstruct import description_length, reconstruc
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
-from shapeprog.inference.roles.roles import named_anew
+from shapeprog.inference.roles.roles import named_anew, note_on_front
 from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
 from shapeprog.inference.ties.tying import tie
 from shapeprog.kernels.compile import modules_of, prepare
@@ -199,7 +199,8 @@ def infer(
         if libraries:
             program = with_library(program, joined(libraries))
     program = in_readable_unit(program, unit_of_result(target, program, unit))
-    reason = " ".join(filter(None, (reason, doubt_of_furniture(evidence), target.note)))
+    front = note_on_front(program) if target.points is not None and statements == "all" else ""
+    reason = " ".join(filter(None, (reason, doubt_of_furniture(evidence), front, target.note)))
     cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)
     if cut:
         reason += f" The time limit of {budget:g} s ended {' and '.join(cut)}: "

@@ -132,14 +132,15 @@ class Parts:
         self.lowest: Mask = plate & (self.bottom <= self.bottom[plate].min(initial=np.inf) + self.near)
         # Walls and fronts are boards by the way that they face, and slender ones that are wide or high in the whole.
         standing = self.board & self.upright
-        wide = (self.side == self.thin) & (self.depth >= self.size[DEPTH] / 2)
-        self.wall: Mask = self.facing_side | (standing & wide)
+        deep = (self.side == self.thin) & (self.depth >= self.size[DEPTH] / 2)
+        wide = (self.depth == self.thin) & (self.side >= self.size[SIDE] / 2)
+        self.wall: Mask = self.facing_side | (standing & deep)
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
         # Of the whole: its sides reach the floor; it has sides, or a body.
         self.walled = (sides & self.grounded).sum() > 1
         self.cased = np.bool_(sides.sum() > 1 or self.bulky.any())
         large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
-        self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & large)
+        self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & large) | (standing & wide)
         highest = np.where(self.in_front, 0.2, 0.3) * self.size[UP]
         self.plinth: Mask = self.front & self.grounded & (self.up <= highest) & (self.rear < 0)
 

@@ -80,7 +80,7 @@ BED: tuple[Rule, ...] = (
 CASE: tuple[Rule, ...] = (
     # In front: a plinth, doors and drawers with their handles.
     ("base", lambda p: p.plinth),
-    ("handle", lambda p: p.tiny & p.in_front & p.cased & ~p.grounded),
+    ("handle", lambda p: p.tiny & p.in_front & p.cased & ~p.grounded & (p.long <= 0.3 * p.size.max())),
     ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
     ("drawer", lambda p: p.front & p.in_front & p.cased),
     # Lying boards: the highest is the top, one on the ground the base.
@@ -104,7 +104,7 @@ CASE: tuple[Rule, ...] = (
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     # All other parts.
-    ("top", lambda p: p.lying & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("top", lambda p: p.lying & p.board & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
     ("shelf", lambda p: p.lying & p.flat),
     ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
     ("block", anything),

@@ -102,28 +102,32 @@ def solid_sides(mesh: Components) -> IntArray:
     the faces point outwards.  Some 2 % of the edges may be open.  The solid is at least .2 cells thick on average: the
     sign of the volume of a crumpled sheet is random.
     """
+    gaps, volume = _gaps_and_volumes(mesh)
+    solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
+    sides: IntArray = np.repeat(np.where(solid, np.sign(volume), 0).astype(np.int64), np.diff(mesh.start))
+    return sides
+
+
+def simple_parts(mesh: Components, seen: IntArray) -> FloatArray:
+    """Low and high corners (K, 2, 3) of the boxes of closed, visible components that fill most of their box.
+
+    ``seen`` has the indices of visible faces.
+    """
+    gaps, volume = _gaps_and_volumes(mesh)
+    corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
+    low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
+    simple = (gaps <= 0.02) & (np.abs(volume) >= 0.5 * (high - low).prod(1))  # a ball fills .52 of its box
+    return np.stack([low, high], 1)[simple & np.isin(np.arange(len(first)), mesh.component_of(seen))]
+
+
+def _gaps_and_volumes(mesh: Components) -> tuple[FloatArray, FloatArray]:
+    """The share of open edges of each component (K,), and its signed volume."""
     counts = np.diff(mesh.start)
     component = np.repeat(np.arange(len(counts)), counts)
     edge, direction = _edges(mesh.faces, len(mesh.vertices))
     uneven = np.bincount(edge, direction) != 0
     gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(counts)) / (3 * counts)
-    heights = mesh.vertices[mesh.faces[:, 0]] * triangle_normals(mesh.vertices, mesh.faces)[0]
-    volume = np.bincount(component, heights.sum(1), minlength=len(counts)) / 6
-    solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
-    sides: IntArray = np.where(solid, np.sign(volume), 0).astype(np.int64)[component]
-    return sides
-
-
-def simple_parts(mesh: Components, sides: IntArray, seen: IntArray) -> FloatArray:
-    """Low and high corners (K, 2, 3) of the boxes of solid, visible components that fill most of their box.
-
-    ``sides`` (F,) are those of :func:`solid_sides`; ``seen`` has the indices of visible faces.
-    """
-    corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
-    low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
-    volume = np.abs(np.add.reduceat(np.linalg.det(corners), first)) / 6
-    simple = (sides[first] != 0) & (volume >= 0.5 * (high - low).prod(1))  # a ball fills .52 of its box
-    return np.stack([low, high], 1)[simple & np.isin(np.arange(len(first)), mesh.component_of(seen))]
+    return gaps, np.add.reduceat(np.linalg.det(mesh.vertices[mesh.faces]), mesh.start[:-1]) / 6
 
 
 def linked(pairs: Array, count: int) -> IntArray:

@@ -106,7 +106,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
         surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
         area * float(weights.mean()), _free_cells(coarse, surface, through=False),
-        simple_parts(mesh, sides, face[: SURFACE.points][front | back])[:64], mesh,
+        simple_parts(mesh, face[: SURFACE.points][front | back])[:64], mesh,
     )  # fmt: skip
 
 

@@ -265,6 +265,14 @@ def test_a_row_ends_before_the_board_that_its_last_copy_would_lie_in():
     assert found.body[0] == program.body[0]
 
 
+@pytest.mark.parametrize("width", [0.45, 0.9])
+def test_thin_square_legs_are_square_and_in_mirrors(width):
+    leg = f"leg(at=(-5.6, {6 - width}, {12 - width}), size=(10.8, {width}, {width}))\n"
+    mirrors = "for i in mirror(side):\n    for j in mirror(depth):\n        "
+    found = assembled(whole("box(at=(5.2, -6, -12), size=(0.45, 12, 24))\n" + mirrors + leg)).program
+    assert [node.name for node in found.walk()] == ["box", "mirror", "mirror", "leg"]
+
+
 def test_the_same_seed_gives_the_same_program():
     assert assembled(whole(SPLAYED), seed=3) == assembled(whole(SPLAYED), seed=3)
 

@@ -32,7 +32,8 @@ class Settings:
 
     # Equal candidates
     equal_points: int = 64  # points of a surface by which two drawings are compared
-    equal_distance: float = 0.1  # distance below which their surfaces are the same
+    equal_distance: float = 0.1  # distance below which their surfaces are the same,
+    equal_share: float = 0.3  # and share of half of the thickness: a thin square bar is not round
     same: float = 0.03  # difference of positions and extents, as a share of the size, of equal candidates
     alike: float = 0.06  # difference of extents, as a share of the size, up to which candidates are copies
     level: float = 0.15  # the same of distances

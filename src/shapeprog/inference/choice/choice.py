@@ -14,11 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.geometry.arrays import over_threads
 from shapeprog.inference.choice.bits import Bits
 from shapeprog.inference.choice.choice_kernels import search
 from shapeprog.inference.choice.coverage import CoverageTable
 from shapeprog.inference.choice.settings import SETTINGS
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import Array
 
 
 def choose(
@@ -41,19 +42,23 @@ def choose(
         table.sample_price[index], table.prices[index] + SETTINGS.earlier * index / len(table.prices), gains[index],
     )  # fmt: skip
     levels = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
-    penalties = [*(levels * SETTINGS.restarts), 0.0]
-    best, first = _no_set(blocks), np.searchsorted(index, np.array(start, np.int64))
-    for step, penalty in enumerate(penalties):
-        if step % len(levels) == 0:  # another search
-            selected = first if step == len(penalties) - 1 else first[:0]
-        incumbent, number = _no_set(blocks) if penalty else best, len(penalties) * seed + step
-        search(*data, penalty, rounds // len(penalties), SETTINGS.blink, number, selected, *incumbent)
-        selected = incumbent[1][incumbent[1] >= 0]
-    return tuple(np.sort(index[selected]).tolist())
+    first = np.searchsorted(index, np.array(start, np.int64))
+    searches = [(levels, first[:0])] * SETTINGS.restarts + [((0.0,), first)]
+    steps, count = SETTINGS.restarts * len(levels) + 1, len(searches)
+    values, sets = np.full((count, 1), -np.inf), np.full((count, blocks), -1, np.int64)
 
+    def run(begin: int, end: int) -> None:
+        for number in range(begin, end):
+            penalties, selected = searches[number]
+            for step, penalty in enumerate(penalties, steps * seed + len(levels) * number):
+                values[number], sets[number] = -np.inf, -1
+                best = values[number], sets[number]
+                search(*data, penalty, rounds // steps, SETTINGS.blink, step, selected, *best)
+                selected = sets[number][sets[number] >= 0]
 
-def _no_set(blocks: int) -> tuple[FloatArray, Array]:
-    return np.full(1, -np.inf), np.full(blocks, -1, np.int64)
+    over_threads(run, count)
+    selected = sets[values.argmax()]
+    return tuple(np.sort(index[selected[selected >= 0]]).tolist())
 
 
 def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

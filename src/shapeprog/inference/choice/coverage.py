@@ -23,6 +23,7 @@ import numpy.typing as npt
 import torch
 
 from shapeprog.geometry.arrays import over_threads
+from shapeprog.geometry.primitives import KINDS
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import face_areas, sample_surface
 from shapeprog.inference.candidates.loops import mirrors
@@ -32,7 +33,7 @@ from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
-from shapeprog.language.program import Loop, Program
+from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, Array, FloatArray
@@ -57,6 +58,8 @@ class Prices:
     part
         Added for every part of a mesh that one primitive draws, 16 times at most: the gaps between drawers have
         little surface.
+    outside
+        Of a candidate that reaches beyond the box around the target, such as a last copy that is too many.
     close
         Added for the share of the target that lies within half a tolerance, with nearly the same normal: among
         statements that explain the same, the one with the shape of the target wins, a square leg before a round one.
@@ -68,6 +71,7 @@ class Prices:
     loop: float = 0.002
     number: float = 0.0005
     part: float = 0.002
+    outside: float = 0.02
     close: float = 0.015
 
     def of(self, program: Program) -> float:
@@ -143,7 +147,9 @@ class Coverage:
         """Arrays with a row for each candidate: bits covered, bits of the interior, unsupported samples, their number,
         the price of each, and that of the text."""
         evidence, prices = self.evidence, self.prices
-        price = np.array([prices.of(program) for program in candidates]) - prices.number * centred(scene, candidates)
+        tied = centred(scene, candidates) + square(scene)
+        price = np.array([prices.of(program) for program in candidates]) - prices.number * tied
+        price += prices.outside * (protrusion(scene, evidence) > SETTINGS.outside)
         explained, interior = covers(scene, self._points, evidence.tolerance, evidence.agreement)
         agreement = max(evidence.agreement, SETTINGS.agreement)
         near, deeper = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
@@ -162,16 +168,38 @@ class Coverage:
 def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64]:
     """Number of axes (B,) along which a candidate is centred, left to right or in depth; each saves one number.
 
-    The position of a centred part follows from its size.  Mirrored and rotated candidates save none.
+    The position of a centred part follows from its size.  Mirrored and rotated candidates save none, nor does a pair
+    along an axis, which is a mirror.
     """
     share = (scene.mask / scene.mask.sum(1, keepdim=True).clamp(min=1)).numpy()
     middle = np.einsum("bn,bni->bi", share, scene.centre.numpy())
-    around = [
-        [any(mirrors(n, axis) or n.name.startswith("rotate") for n in program.walk()) for axis in (DEPTH, SIDE)]
-        for program in candidates
-    ]
+    around = [[any(_around(node, axis) for node in program.walk()) for axis in (DEPTH, SIDE)] for program in candidates]
     near = np.abs(middle[:, [DEPTH, SIDE]]) < SETTINGS.centred
     return np.sum(near & ~np.reshape(around, near.shape).astype(np.bool_), 1)
+
+
+def _around(node: Node, axis: int) -> bool:
+    pair = node.name == "translate" and node.values[0] == 2 and node.values[1 + axis] != 0
+    return pair or mirrors(node, axis) or node.name.startswith("rotate")
+
+
+def square(scene: Scene) -> npt.NDArray[np.bool_]:
+    """Whether the first primitive of a candidate (B,) is a bar of square section, whose sides will be one number.
+
+    Without this, a round bar is cheaper than a square one.
+    """
+    sides = np.sort(2 * scene.bounds[:, :1].numpy(), 2)
+    bars = (scene.kind[:, :1].numpy() == KINDS["cuboid"]) & (sides[..., 1] - sides[..., 0] < SETTINGS.square)
+    return np.any(bars, 1)
+
+
+def protrusion(scene: Scene, evidence: Evidence) -> FloatArray:
+    """How far each candidate (B,) reaches beyond the box around the surface."""
+    centre, reach = scene.centre.numpy(), scene.reach.numpy()
+    low, high = evidence.surface.min(0), evidence.surface.max(0)
+    beyond = np.maximum(low - (centre - reach), centre + reach - high).max(2)
+    result: FloatArray = np.where(scene.mask, beyond, 0.0).max(1, initial=0.0)
+    return result
 
 
 def parts_drawn(scene: Scene, evidence: Evidence) -> npt.NDArray[np.bool_]:

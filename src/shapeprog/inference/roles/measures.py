@@ -118,6 +118,7 @@ class Parts:
         self.alongside: Mask = (middle >= bottom) & (self.top <= top + 2 * self.near)
         self.below: Mask = ~self.main & (middle < bottom)
         self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)  # it ends clearly above
+        self.highest: Mask = self.top >= self.floor + self.size[UP] - self.near
         self.above: Mask = self.bottom >= top - 2 * self.near  # it begins there
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)

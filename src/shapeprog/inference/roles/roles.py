@@ -55,6 +55,7 @@ SEATING: tuple[Rule, ...] = (
     # Behind: a back, its rails and slats, its posts.
     ("slat", lambda p: p.rising & p.level & ((p.equal >= 5) | (p.behind & (p.span >= 0.5) & (p.equal >= 3)))),
     ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.level & (p.up <= p.size[UP] / 4)),
+    ("rail", lambda p: p.rising & p.behind & (p.span >= 0.5) & p.highest & (p.up <= 0.1 * p.size[UP])),
     ("back", lambda p: p.rising & p.behind & (p.span >= 0.5)),
     # At the sides: arm rests and their posts.
     ("arm_post", lambda p: p.rising & (p.aside > 0.3) & (p.rear < 0.25) & p.upright),
@@ -84,7 +85,7 @@ CASE: tuple[Rule, ...] = (
     ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
     ("drawer", lambda p: p.front & p.in_front & p.cased),
     # Lying boards: the highest is the top, one on the ground the base.
-    ("top", lambda p: (p.wide | p.main) & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("top", lambda p: (p.wide | p.main) & p.highest & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
     ("base", lambda p: p.wide & p.grounded & (p.up <= 0.2 * p.size[UP])),
     ("shelf", lambda p: p.wide & p.flat & p.board),
@@ -104,7 +105,7 @@ CASE: tuple[Rule, ...] = (
     ("apron", lambda p: p.level & (p.top >= p.floor + 0.8 * p.size[UP])),
     ("stretcher", lambda p: p.level),
     # All other parts.
-    ("top", lambda p: p.lying & p.board & (p.top >= p.floor + p.size[UP] - p.near) & (p.up <= 0.3 * p.size[UP])),
+    ("top", lambda p: p.lying & p.board & p.highest & (p.up <= 0.3 * p.size[UP])),
     ("shelf", lambda p: p.lying & p.flat),
     ("drawer", lambda p: p.cased & p.in_front & ~p.grounded),
     ("block", anything),

@@ -70,7 +70,7 @@ class Prices:
     statement: float = 0.005
     loop: float = 0.002
     number: float = 0.0005
-    part: float = 0.002
+    part: float = 0.003
     outside: float = 0.02
     close: float = 0.015
 

@@ -95,32 +95,30 @@ def _edges(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
     return edge, np.sign(end - start)
 
 
-def solid_sides(mesh: Components) -> IntArray:
+def solid_sides(mesh: Components, gaps: FloatArray, volume: FloatArray) -> IntArray:
     """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
 
     At each edge of a closed surface, equally many faces run in both directions, and the signed volume is positive if
     the faces point outwards.  Some 2 % of the edges may be open.  The solid is at least .2 cells thick on average: the
-    sign of the volume of a crumpled sheet is random.
+    sign of the volume of a crumpled sheet is random.  ``gaps`` and ``volume`` are those of :func:`closure`.
     """
-    gaps, volume = _gaps_and_volumes(mesh)
     solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
     sides: IntArray = np.repeat(np.where(solid, np.sign(volume), 0).astype(np.int64), np.diff(mesh.start))
     return sides
 
 
-def simple_parts(mesh: Components, seen: IntArray) -> FloatArray:
+def simple_parts(mesh: Components, gaps: FloatArray, volume: FloatArray, seen: IntArray) -> FloatArray:
     """Low and high corners (K, 2, 3) of the boxes of closed, visible components that fill most of their box.
 
-    ``seen`` has the indices of visible faces.
+    ``gaps`` and ``volume`` are those of :func:`closure`; ``seen`` has the indices of visible faces.
     """
-    gaps, volume = _gaps_and_volumes(mesh)
     corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
     low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
     simple = (gaps <= 0.02) & (np.abs(volume) >= 0.5 * (high - low).prod(1))  # a ball fills .52 of its box
     return np.stack([low, high], 1)[simple & np.isin(np.arange(len(first)), mesh.component_of(seen))]
 
 
-def _gaps_and_volumes(mesh: Components) -> tuple[FloatArray, FloatArray]:
+def closure(mesh: Components) -> tuple[FloatArray, FloatArray]:
     """The share of open edges of each component (K,), and its signed volume."""
     counts = np.diff(mesh.start)
     component = np.repeat(np.arange(len(counts)), counts)

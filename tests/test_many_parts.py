@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +15,17 @@ import twins
 from geometry_helpers import make_scene, random_scene, require
 
 from shapeprog import export, parse, unroll
+from shapeprog.data.shape import Shape
 from shapeprog.errors import OutputError, ShapeProgError
+from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats import build123d, meshes
+from shapeprog.formats.json_form import program_to_json
 from shapeprog.formats.parts import crease_normals, part_normals, parts
+from shapeprog.formats.samples import npy
 from shapeprog.geometry import mesh, surface
 from shapeprog.geometry.arrays import table_of
 from shapeprog.geometry.distance import each_distance, nearest_primitive
+from shapeprog.space import Frame
 from shapeprog.view.viewer import viewer
 
 ROW = "for i in translate(100000, by=(0, 0, 3)):\n    leg(at=(0, 0, 0), size=(2, 2, 2))\n"
@@ -86,6 +93,20 @@ def test_too_many_triangles_are_refused_with_the_number_allowed(monkeypatch):
     assert len(parts(parse(row(10, 3)))) == 10
     with pytest.raises(ShapeProgError, match="more than 120 triangles"):
         parts(parse(row(11, 3)))
+
+
+def test_cells_and_lists_of_solids_need_no_limit_of_triangles(monkeypatch):
+    program = parse(
+        "width, depth, height = 24, 24, 24\nfor _ in translate(3, x=8):\n    cushion(left=0, width=8, edge=1)\n"
+    )
+    shape, before = Shape("a", np.ones((32, 32, 32), bool)), (npy(program, Frame()), program_to_json(program))
+    monkeypatch.setattr(mesh, "MOST_TRIANGLES", 12)
+    assert before == (npy(program, Frame()), program_to_json(program))
+    assert len(json.loads(before[1])["solids"]) == 3
+    with pytest.raises(ShapeProgError, match="resolution"):
+        npy(program, Frame(), resolution=513)
+    far = parse("box(at=(1e8, 0, 0), size=(1, 1, 1))\nseat(box(at=(0, 0, 0), size=(1, 1, 1)))")
+    assert evaluate_program(far, replace(shape, points=np.ones((100, 3), np.float32))).iou == 0
 
 
 def test_parts_that_touch_nothing_are_put_into_the_union_as_they_are():

@@ -4,7 +4,7 @@
 array           shape                 meaning
 ==============  ====================  ==============================================================================
 ``ids``         (N,)                  names
-``voxels``      (N, 4096) uint8       ``numpy.unpackbits`` gives the 32^3 touched cells of the grid frame
+``voxels``      (N, 4096) uint8       ``numpy.unpackbits`` gives the 32^3 cells, touched or enclosed, of the grid
 ``points``      (N, P, 3) uint16      ``(points / 65535 - 0.5) * longest_side``: world frame, axes up, depth, left-right
 ``longest_side``  (N,)                of the bounding box, in the world
 ``split``       (N,)                  train, val or test

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -153,7 +154,9 @@ def evaluate_program(
     """
     scene = unroll(program)
     if iou is None:
-        iou = float(cells.iou(occupied(program, scene, snapped), cells.pack(target.voxels)))
+        iou = 0.0
+        with suppress(ShapeProgError):  # parts too far away, or too many, to have cells
+            iou = float(cells.iou(occupied(program, scene, snapped), cells.pack(target.voxels)))
     to_target, from_target, f1, floor = _distances(scene, target, points, seed)
     row = Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,

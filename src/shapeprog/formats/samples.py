@@ -10,7 +10,7 @@ import torch
 from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.formats.parts import placed
 from shapeprog.geometry import cells
-from shapeprog.geometry.mesh import joined, part_meshes
+from shapeprog.geometry.mesh import MOST_VOXELISED, joined, part_meshes
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.geometry.voxelise import voxelise_mesh
@@ -20,7 +20,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.space import RESOLUTION, Frame
 
 POINTS = 5000  # default number of points
-FINEST = 1024  # most cells along each side
+FINEST = 512  # most cells along each side
 
 
 def occupied(
@@ -29,12 +29,12 @@ def occupied(
     """The packed cells of a program, as they are exported, stored in packs and compared with those of a target.
 
     Those of the whole-numbered program, as published, if all statements are of the kind that generators are taught: by
-    default of the program rounded.  Of others, whose parts may be thinner than a cell, those that the solid touches.
-    Raises what :func:`shapeprog.geometry.mesh.part_meshes` does.
+    default of the program rounded.  Of others, whose parts may be thinner than a cell, those that the solid touches
+    or encloses.  Raises what :func:`shapeprog.geometry.mesh.part_meshes` does.
     """
     if snapped is not None or all(language()[node.name].taught for node in program.walk()):
         return cells.rasterise(unroll(program.snap() if snapped is None else snapped), resolution)
-    vertices, faces = joined([(part.vertices, part.faces) for part in part_meshes(scene)])
+    vertices, faces = joined([(part.vertices, part.faces) for part in part_meshes(scene, MOST_VOXELISED)])
     return cells.pack(voxelise_mesh(vertices * (resolution / RESOLUTION), faces, resolution))
 
 

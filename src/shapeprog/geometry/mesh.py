@@ -24,7 +24,7 @@ FARTHEST = 1 << 24
 """Coordinates in cells up to which parts are meshed: single precision, in which files of meshes are, resolves no cells
 beyond."""
 
-MOST_TRIANGLES = 1 << 21  # most triangles of the parts of a scene together
+MOST_TRIANGLES, MOST_VOXELISED = 1 << 21, 1 << 24  # most triangles of the parts of a scene together
 MOST_JOINED = 1 << 13  # most parts of which one solid is made, which takes seconds
 
 STEP = 1 / 16384
@@ -75,14 +75,15 @@ def solids_of(scene: Batch) -> Solids:
     return Solids(solid, size, centre, rotation, reach)
 
 
-def part_meshes(scene: Batch) -> list[PartMesh]:
+def part_meshes(scene: Batch, most: float | None = None) -> list[PartMesh]:
     """A watertight mesh of every primitive of one scene, in the order of the slots; degenerate ones are left out.
 
     Raises
     ------
     ShapeProgError
-        As for :func:`solids_of`, or if there are more triangles than ``MOST_TRIANGLES``.
+        As for :func:`solids_of`, or if there are more triangles than ``most``, by default ``MOST_TRIANGLES``.
     """
+    most = MOST_TRIANGLES if most is None else most
     results, triangles, cached = [], 0, dict[bytes, Triangles]()
     solid, size, centre, rotation, _ = solids_of(scene)
     for slot, kind in zip(np.flatnonzero(solid).tolist(), array(scene.kind)[solid].tolist(), strict=True):
@@ -92,9 +93,9 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
             cached[key] = vertices, np.asarray(faces, np.int64)
         vertices, faces = cached[key]
         triangles += len(faces)
-        if triangles > MOST_TRIANGLES:
+        if triangles > most:
             raise ShapeProgError(
-                f"the {int(solid.sum())} parts of this program have more than {MOST_TRIANGLES} triangles",
+                f"the {int(solid.sum())} parts of this program have more than {most} triangles",
                 "lower its counts, or save it as program text, .scad or .py, which keep its loops",
             )
         results.append(PartMesh(slot, vertices @ rotation[slot].T + centre[slot], faces))
@@ -104,11 +105,11 @@ def part_meshes(scene: Batch) -> list[PartMesh]:
 def bounds(scene: Batch) -> Iterator[tuple[int, FloatArray, FloatArray]]:
     """The slot of each solid part of one scene, and the low and high corner (3,) of the box around it.
 
-    It is exact to .2 % of round parts that are turned, and exact for others; raises what :func:`part_meshes` does.
+    It is exact to .2 % of round parts that are turned, and exact for others; raises what :func:`solids_of` does.
     """
     parts = solids_of(scene)
     half = (np.abs(parts.rotation) @ parts.half[..., None])[..., 0]
-    for slot, vertices, _ in part_meshes(scene):  # round parts are prisms there
+    for slot, vertices, _ in part_meshes(scene, np.inf):  # round parts are prisms there
         low, high = parts.centre[slot] - half[slot], parts.centre[slot] + half[slot]
         yield slot, np.maximum(low, vertices.min(0)), np.minimum(high, vertices.max(0))
 

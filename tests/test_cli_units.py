@@ -187,9 +187,11 @@ def test_python_exports_programs_in_the_unit_that_is_asked_for(tmp_path: Path) -
 
 def test_parts_that_round_to_nothing_are_told(run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.shape").write_text(
-        "# unit: mm\nwidth, depth, height = 4, 4, 4\nback(front=0, depth=0.02)\nleg(width=1)"
+        "# unit: mm\nwidth, depth, height = 4, 4, 4\nback(front=0, depth=0.01)\nleg(width=1)"
     )
-    assert "parts thinner than 0.05 mm are left out (wrong unit?): 1" in run("export", "a.shape", "a.csv").out
+    for words, thinnest in (([], "0.05 mm"), (["--unit", "in", "-q"], "0.0005 in")):
+        ended = run("export", "a.shape", "a.csv", *words)
+        assert f"parts thinner than {thinnest} are left out (wrong unit?): 1" in ended.err
 
 
 @pytest.mark.parametrize(

@@ -308,7 +308,7 @@ def test_a_cut_list_has_each_distinct_part_once(tmp_path: Path, capsys: pytest.C
     program_file.write_text(CABINET.lstrip())
     with pytest.raises(SystemExit, match="0"):
         main(["export", str(program_file), str(tmp_path / "cuts.csv"), "--unit", "mm"])
-    assert "1 copy lies where another one lies" in capsys.readouterr().out
+    assert "where another one lies are left out (a mirror through the part?): 1" in capsys.readouterr().err
     lines = (tmp_path / "cuts.csv").read_text().splitlines()
     assert lines[0] == "count,role,length (mm),width (mm),thickness (mm),diameter (mm),shape"
     assert "2,side,600,400,18,,board" in lines

@@ -89,7 +89,7 @@ def _options(
         bool | None, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error; of every command.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, warnings and tables.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print neither remarks nor the names of files.")] = False,
 ) -> None:
     """Infer short, editable programs from furniture given as meshes, point clouds or voxels.
 

@@ -59,7 +59,7 @@ def export_command(
     --upright change that. A .csv is a cut list, which is printed too. --set uses the unit of the program file.
     """
     from shapeprog.formats import export
-    from shapeprog.formats.cuts import cut_table
+    from shapeprog.formats.cuts import listed_cuts
     from shapeprog.formats.files import written_format
     from shapeprog.language.unit import MOST_METRES
     from shapeprog.space import SPAN
@@ -86,7 +86,9 @@ def export_command(
             continue
         terminal.say(f"wrote {path}")
         if path.suffix.lower() == ".csv":
-            terminal.say(cut_table(loaded, frame, **asked))
+            cuts = listed_cuts(loaded, frame, **asked)
+            terminal.say(cuts.table)
+            terminal.warn(path, *cuts.warnings)
     terminal.finish(failures, terminal.FAILED if len(failures) < len(outputs) else terminal.MISTAKE)
 
 

@@ -87,16 +87,18 @@ class CutList(NamedTuple):
 
     @property
     def table(self) -> str:
-        """The list as a table of plain text, with the total area of its boards and a warning of coinciding copies."""
+        """The list as a table of plain text, with the total area of its boards."""
         widths = [max(map(len, column)) for column in zip(*self.rows, strict=True)]
         lines = ["  ".join(f"{text:<{n}}" for text, n in zip(row, widths, strict=True)).rstrip() for row in self.rows]
-        lines.append(f"Area of boards, length x width: {self.area}")
-        if self.coinciding:
-            copies = f"{self.coinciding} copies lie" if self.coinciding > 1 else "1 copy lies"
-            lines.append(f"Warning: {copies} where another one lies (a mirror through the part?).")
-        if self.dropped:
-            lines.append(f"Warning: parts thinner than {500 * FINEST:g} mm are left out (wrong unit?): {self.dropped}")
-        return "\n".join(lines)
+        return "\n".join([*lines, f"Area of boards, length x width: {self.area}"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is not counted, and why."""
+        same = f"copies that lie where another one lies are left out (a mirror through the part?): {self.coinciding}"
+        least = "0.0005 in" if self.unit == "in" else "0.05 mm"
+        thin = f"parts thinner than {least} are left out (wrong unit?): {self.dropped}"
+        return [same] * (self.coinciding > 0) + [thin] * (self.dropped > 0)
 
 
 @lru_cache(maxsize=1)  # the command writes and prints the same list
@@ -124,13 +126,13 @@ def cuts_csv(program: Program, frame: Frame, unit: str = "") -> str:
     return text.getvalue()
 
 
-def cut_table(program: Program, frame: Frame | None = None, **asked: Any) -> str:
-    """The table of the cut list that :func:`shapeprog.export` writes with the same arguments."""
+def listed_cuts(program: Program, frame: Frame | None = None, **asked: Any) -> CutList:
+    """The cut list that :func:`shapeprog.export` writes with the same arguments."""
     chosen = format_of("a.csv")
     assert chosen is not None
     lies = placement(chosen, program, frame, **asked)
     assert lies.frame is not None
-    return cut_list(program, lies.frame, lies.unit).table
+    return cut_list(program, lies.frame, lies.unit)
 
 
 def _copies(scene: Any, program: Program, scale: float, unit: str) -> Iterator[tuple[Cut, tuple[float, ...]]]:

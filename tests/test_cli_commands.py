@@ -290,6 +290,9 @@ def test_the_input_is_shown_as_it_was_inferred(tmp_path: Path, name: str):
         for one, other in ((seen.points, turned.points), (seen.vertices, turned.vertices)):
             assert (one is None) == (other is None)
             assert one is None or np.allclose(one, size * other, atol=1e-4)
+    for frame in (replace(turned.frame, scale=1e-3), replace(turned.frame, centre=(1e3, 0, 0))):
+        seen = writing._as_inferred(tmp_path / name, frame)  # the same object in another unit, or in another place
+        assert turned.vertices is None or np.array_equal(seen.vertices, turned.vertices)
 
 
 @pytest.mark.usefixtures("quick")

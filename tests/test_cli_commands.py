@@ -331,7 +331,7 @@ def test_show_and_sheet_write_a_page_and_a_picture(run: Run, tmp_path: Path, pro
     assert (tmp_path / "sheet.png").exists()
     program.unlink()
     ended = run("sheet", ".", "sheet.png")
-    assert (ended.code, "was the file cut off?" in ended.err) == (1, True)
+    assert (ended.code, "was the file cut off?" in ended.err) == (2, True)
 
 
 def test_statements_prints_the_manual(run: Run):

@@ -186,7 +186,7 @@ def sheet_command(
         beside, scores = _input_and_scores(path, frame, shape, noted=False)
         items.append(Item(path.stem, beside, loaded, scores_text(scores, loaded)[0]))
     if not items:
-        terminal.finish(failures)
+        terminal.finish(failures, terminal.MISTAKE)
     contact_sheet(items, output, columns=columns, title=title)
     terminal.say(f"wrote {output}: {len(items)} programs")
     terminal.finish(failures)

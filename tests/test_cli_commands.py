@@ -301,6 +301,10 @@ def test_results_in_a_folder_of_inputs_are_no_inputs(run: Run, tmp_path: Path):
     for _ in range(2):
         assert run("infer", ".", "--out", "res", "--no-picture").code == 0
     assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["table.json"]
+    for suffix in (".json", ".shape"):  # results beside the input that they are of
+        (tmp_path / f"table{suffix}").write_bytes((tmp_path / "res" / f"table{suffix}").read_bytes())
+    assert run("infer", ".", "--out", "res", "--no-picture").code == 0
+    assert "holds results of infer alone" in run("infer", "res", "--out", "more").err
 
 
 def test_render_makes_pictures_and_export_cells_and_points(run: Run, tmp_path: Path, program: Path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -18,6 +19,7 @@ from shapeprog.data.reading import BYTES, POINTS, check_count, check_file, in_wo
 from shapeprog.data.shape import Shape
 from shapeprog.data.uprightness import find_up
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.formats.shape import read_text
 from shapeprog.language.unit import metres
 from shapeprog.space import Array
 
@@ -239,15 +241,21 @@ def _files_in(folder: Path) -> tuple[list[Path], Skipped]:
     # ShapeNet has voxels and mesh of an object in one folder: one shape, read from the mesh.
     meshes = {path.parent for path in files if path.suffix.lower() != ".binvox" and in_shapenet_layout(path)}
     files = [path for path in files if not (path.suffix.lower() == ".binvox" and path.parent in meshes)]
-    files = [path for path in files if not _is_result(path)]
-    if not files and not skipped:
-        raise InputError(f"the folder {folder} holds no file that can be read as a shape", "name another folder")
-    return files, skipped
+    inputs = [path for path in files if not _is_result(path)]
+    if not inputs and not skipped:
+        content = "results of infer alone, which are no inputs" if files else "no file that can be read as a shape"
+        raise InputError(f"the folder {folder} holds {content}", "name another folder, or the file itself")
+    return inputs, skipped
 
 
 def _is_result(path: Path) -> bool:
-    """Whether a mesh was written by ``shapeprog infer``, with the program beside it."""
-    return path.suffix == ".glb" and all(path.with_suffix(suffix).exists() for suffix in (".json", ".shape"))
+    """Whether a mesh was written by ``shapeprog infer`` from another file, with the program beside it."""
+    if path.suffix != ".glb" or not path.with_suffix(".shape").exists():
+        return False
+    try:
+        return path.resolve() != Path(json.loads(read_text(path.with_suffix(".json")))["source"]).resolve()
+    except Exception:  # no file, or somebody else's
+        return False
 
 
 def _name(path: Path) -> str:

@@ -378,6 +378,9 @@ def test_prepare_writes_packs(run: Run, tmp_path: Path):
     assert "1 shapes" in ended.out
     assert "two.obj" in ended.err
     assert "Few shapes, so scores on them say little: table_" in ended.err
+    for name in ("table/two.obj", "stray.obj"):
+        (tmp_path / "in" / name).unlink()
+    assert [run("prepare", "in", output).code for output in ("in", "in", "in/packs", "in")] == [0] * 4
 
 
 def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, program: Path):

@@ -22,6 +22,7 @@ from shapeprog.space import SPAN, Frame
 
 SPLITS = ("train", "val", "test")
 """Names of the splits, in the order of their shares."""
+PACKS = tuple(f"_{split}.npz" for split in SPLITS)  # ends of the names of packs, which are no models
 
 SYNSETS = {
     "02801938": "basket",
@@ -81,8 +82,8 @@ def prepare(
     category's folder.  Of several files of a model a mesh is read before voxels.  The split of a shape follows from its
     cells alone, so equal shapes never straddle a split, in whatever order, together or apart they are read.  Worlds
     are scaled to a bounding box of diagonal 1, centred, with axes up, depth, left-right.  A broken model, or a
-    pack without points because some of its models are voxels, is a failure that stops nothing.  The last record holds
-    the packs and the failures.
+    pack without points because some of its models are voxels, is a failure that stops nothing.  Files named as packs
+    are no models.  The last record holds the packs and the failures.
 
     Parameters
     ----------
@@ -154,9 +155,9 @@ def find_models(directory: Path, skipped: Skipped) -> list[tuple[str, str, Path]
     folders = [path for path in entries(directory, skipped) if is_folder(path, skipped)]
     for branch in [*folders, directory.resolve()]:
         if models and branch not in folders:
-            stray = [path for path in entries(branch, skipped) if path.suffix.lower() in suffixes and path.is_file()]
+            files = [path for path in entries(branch, skipped) if path.suffix.lower() in suffixes and path.is_file()]
             error = InputError("it lies in no folder of a category, as other models do", "move it into one")
-            skipped += [(path, error) for path in stray]
+            skipped += [(path, error) for path in files if not path.name.endswith(PACKS)]
             break
         category = SYNSETS.get(branch.name, re.sub(r"[^\w-]+", "_", branch.name))
         closed: Skipped = []
@@ -168,7 +169,7 @@ def find_models(directory: Path, skipped: Skipped) -> list[tuple[str, str, Path]
         if layout:
             skipped += closed
         else:
-            for path in files_below(branch, suffixes, skipped):
+            for path in (file for file in files_below(branch, suffixes, skipped) if not file.name.endswith(PACKS)):
                 model = category, path.relative_to(branch).with_suffix("").as_posix()
                 models[model] = min(path, models.get(model, path), key=_preference)
     if not models:

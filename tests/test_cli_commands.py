@@ -17,6 +17,7 @@ from commands import FRAME, PROGRAM, Run, table
 from shapeprog import inference
 from shapeprog.cli import main, terminal, writing
 from shapeprog.data import load as load_shape
+from shapeprog.data import loading
 from shapeprog.formats import export, load_with_frame
 
 
@@ -484,7 +485,16 @@ def test_export_ends_as_a_failure_if_one_file_is_written_and_as_a_mistake_if_non
     assert [run("export", program, name, "no/a.stl").code for name in ("a.stl", "no/b.stl")] == [1, 2]
 
 
-def test_units_of_statements_in_cells_and_readers_that_are_not_installed_are_told(run: Run, tmp_path: Path):
+@pytest.mark.parametrize("words", [["export"], ["tidy"]])
+def test_a_missing_program_is_told_before_the_file_to_write_that_exists(run: Run, tmp_path: Path, words: list[str]):
+    (tmp_path / "b.shape").write_text("box()")
+    assert "there is no file missing.shape" in run(*words, "missing.shape", "b.shape").err
+
+
+def test_units_of_statements_in_cells_and_readers_that_are_not_installed_are_told(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(loading, "mesh_formats", lambda: {"obj"})
     table(tmp_path / "a.obj")
     (tmp_path / "a.3mf").write_text("")
     for words, told in ((["a.obj", "--paper", "--unit", "cm"], "--paper"), (["a.3mf"], "pip install lxml networkx")):

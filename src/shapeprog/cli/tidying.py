@@ -44,9 +44,9 @@ def tidy_command(
     from shapeprog.library import joined, with_library
 
     terminal.check_units(unit, file_unit, needed=True)
-    terminal.check_free([out] if out else [], overwrite, program)
     libraries = terminal.load_libraries(modules, library)
     given, frame = terminal.read_program_file(program)
+    terminal.check_free([out] if out else [], overwrite, program)
     if not given.size:
         raise InputError(f"{program} draws nothing", "give a program with at least one drawing statement")
     lines = [] if given.source is None or not given.source.placed else [*given.source.walk()]

@@ -70,8 +70,8 @@ def export_command(
         if "=" in path.name and CHANGE.fullmatch(str(path)) and format_of(path) is None:
             raise OutputError(f"{path} is no file to write", f"changes of numbers follow --set: --set {path}")
     formats = [written_format(path) for path in outputs]
-    terminal.check_free(outputs, overwrite, program)
     loaded, frame = terminal.read_program_file(program, changes)
+    terminal.check_free(outputs, overwrite, program)
     makers = any(chosen.maker for chosen in formats)
     known = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
     if frame is not None and makers and not known and SPAN * frame.scale > MOST_METRES:

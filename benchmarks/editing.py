@@ -103,17 +103,15 @@ def edit_scores(program: Program) -> EditScores:
         except ShapeProgError:  # such as a division by zero
             results.append((0.0, 0.0, 0.0))
             continue
-        results.append((
-            len(touching & _contacts(after)) / len(touching) if touching else np.nan,
-            float(_mirrored(after) >= mirrored - STRAY) if mirrored >= 1 - STRAY else np.nan,
-            float(_one_piece(after)) if one_solid else np.nan,
-        ))  # fmt: skip
-    scores = np.array(results).reshape(-1, 3)
+        kept = len(touching & _contacts(after)) / max(len(touching), 1)
+        results.append((kept, float(_mirrored(after) >= mirrored - STRAY), float(_one_piece(after))))
+    applies = [len(touching) > 0, mirrored >= 1 - STRAY, one_solid]  # also where an edit fails
+    scores = np.where(applies, np.array(results).reshape(-1, 3), np.nan)
     contacts, symmetry, pieces_kept = (
         float(np.nanmean(column)) if np.isfinite(column).any() else float("nan") for column in scores.T
     )
-    kept = _names_kept(program, before) if one_solid else float("nan")
-    return EditScores(contacts, symmetry, pieces_kept, free, kept)
+    names_kept = _names_kept(program, before) if one_solid else float("nan")
+    return EditScores(contacts, symmetry, pieces_kept, free, names_kept)
 
 
 def _names_kept(program: Program, before: Scene) -> float:

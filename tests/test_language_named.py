@@ -109,6 +109,7 @@ def test_names_of_placed_text_are_whole_where_they_count() -> None:
         ("n = 2\nm = 2 * n\nfor _ in row(m, last=at(top=2)):\n    shelf(height=3)\n", ["n", "m"]),
         ("n = 2\nfor _ in row(n + 1, last=at(top=2)):\n    shelf(height=n)\n", []),
         ("n = 2\nfor _ in row(width / n, last=at(top=2)):\n    shelf(height=3)\n", []),
+        ("n = 1.5\nfor _ in row(2 * n, last=at(top=2)):\n    shelf(height=3)\n", []),
     ],
 )
 def test_names_in_sums_and_products_of_counts_alone_are_whole(text: str, whole: list[str]) -> None:

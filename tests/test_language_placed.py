@@ -176,6 +176,7 @@ def test_a_solid_lies_where_its_keywords_say(text: str) -> None:
 
 
 def test_a_large_edge_counts_as_half_of_the_least_size() -> None:
+    assert parse(str(parse(WHOLE + "cushion(cushion(edge=1))"))) == parse(WHOLE + "cushion(cushion(edge=1))")
     program = parse(WHOLE + "cushion(height=10, edge=50)")
     corner = torch.tensor([[10.0 - 40, 30, -50]]) * 24 / 100  # up, depth, side
     distance = sp.unroll(program).distance(corner).item()

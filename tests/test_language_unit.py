@@ -161,4 +161,3 @@ def test_units_follow_from_the_frame_of_an_object() -> None:
     frame = Frame(scale=0.0375)
     assert Unit.of(frame, "cm") == Unit("cm", 3.75)
     assert Unit.of(frame, "cm", "in").per_cell == pytest.approx(0.0375 * 2.54)
-    assert Unit.of(frame, "cm").to("mm").per_cell == pytest.approx(37.5)

@@ -179,6 +179,8 @@ def test_several_libraries_are_one_in_which_the_first_of_a_name_counts() -> None
     others = library("def posts():\n    box(height=1)\ndef four():\n    posts()\ndef five():\n    box(width=1)\n")
     assert [function.name for function in joined([both, others]).functions] == ["posts", "shelves", "five"]
     assert joined([both, others]).source.functions["posts"] == both.source.functions["posts"]
+    users = library(f"{POSTS}def four():\n    posts(thick=1)\n")
+    assert [function.name for function in joined([library(POSTS), users]).functions] == ["posts", "four"]
 
 
 def test_a_default_may_be_larger_than_the_box_that_is_tried_first() -> None:

@@ -31,8 +31,8 @@ def tidy_command(
     Example: shapeprog tidy old.shape new.shape
 
     Nearly equal lengths become equal, nearly flush or touching faces flush or touching, nearly centred parts centred.
-    The remaining numbers get names; changing one moves every part that depends on it. The size of the whole stays;
-    comments and earlier names are left out. Programs with groups or functions are refused.
+    The remaining numbers get names; changing one moves every part that depends on it. The whole is not shrunk to its
+    parts; comments and earlier names are left out. Programs with groups or functions are refused.
     """
     from shapeprog.formats import save
     from shapeprog.formats.frames import asked_unit

@@ -91,14 +91,14 @@ def _keywords(keywords: Keywords) -> Iterator[Use]:
 
 
 def counted_names(source: Source) -> set[str]:
-    """Names that stand for a count, turn or axis of a loop, or are passed on to one, and those that occur in sums and
-    products of such alone; parameters of functions and names in them are ``function.name``."""
+    """Names that stand for a count, turn or axis of a loop, or are passed on to one, and whole numbers that occur in
+    sums and products of such alone; parameters of functions and names in them are ``function.name``."""
     used = [(use, {scope(name) for name in names_in(use.value)}) for use, scope in _scoped_uses(source.lines, str)]
     result: set[str] = set()
-    size = -1
+    size, fractional = -1, {name for name, value in source.numbers.items() if isinstance(value, float) and value % 1}
     while size < len(result):
         size = len(result)
-        others = {*SIZES}.union(
+        others = {*SIZES, *fractional}.union(
             *(names for use, names in used if not is_count(use, result) or "/" in text_of(use.value))
         )
         counts = ((use.value, names) for use, names in used if is_count(use, result))

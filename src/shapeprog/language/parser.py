@@ -188,8 +188,8 @@ class _Reader(Reader):
         pairs, note = tuple(keywords.items()), self.note(call)
         if function and not kind:
             return self.recorded(Call(word, pairs, note, role), call, places)  # type: ignore[arg-type]
-        role = role or (word if kind != word and word in language().roles else "")
-        return self.recorded(Part(kind, pairs, role, note), call, places)
+        role = role or (word if word in language().roles else "")
+        return self.recorded(Part(kind, pairs, "" if role == kind else role, note), call, places)
 
     def _refuse(self, argument: ast.expr, word: str, function: Function | None) -> None:
         """Refuse an argument without a keyword."""

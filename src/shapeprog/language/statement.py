@@ -351,7 +351,7 @@ def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], 
             try:
                 (default,) = parameter.checked(name, [number_of(argument.default)])
             except ShapeProgError as mistake:
-                raise DeclarationError(f"wrong default: {mistake.message}", mistake.hint) from None
+                raise DeclarationError(f"wrong default of {word!r}: {mistake.message}", mistake.hint) from None
             parameter = replace(parameter, default=default)
         parameters.append(parameter)
         start += quantity.width
@@ -376,17 +376,14 @@ def _try(declared: Statement) -> None:
             what = f"loop {declared.name!r} returns a motion"
             requirement = "a turn must be (...), a rotation (..., 3, 3), a pivot, a shift and signs (..., 3)"
         else:
-            for numbers in (values, values[0]):
-                lead = tuple(numbers.shape[:-1])
+            for numbers, lead in ((values, (2,)), (values[0], ())):
                 for solids in declared.solids(numbers):
                     parts += [(solids.size, (*lead, SIZES)), (solids.centre, (*lead, 3))]
             if parts and declared.pivot is not None:
                 parts.append((declared.pivot(**declared.split(values)), (2, 3)))
             what = f"statement {declared.name!r} returns solids"
             requirement = "sizes must be (..., 4), centres and a pivot (..., 3)"
-        shapes = [None if part is None else tuple(part.shape) for part, _ in parts]
-        box = Box(np.zeros(3), np.eye(3), np.array([6.0, 1.0, 1.0]))
-        counts = {len(start) for start in declared.hint(box)} - {declared.size} if declared.hint else set()
+        shapes = [part if part is None else tuple(part.shape) for part, _ in parts]
     except Exception as cause:
         message = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
         hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions or none"
@@ -394,6 +391,10 @@ def _try(declared: Statement) -> None:
     if not parts or any(shape not in (None, right) for shape, (_, right) in zip(shapes, parts, strict=True)):
         requirement += " with the leading dimensions of the parameters"
         raise DeclarationError(f"{what} of shapes {shapes}", requirement)
+    what, box = f"the hint of statement {declared.name!r}", Box(np.zeros(3), np.eye(3), np.array([6.0, 1.0, 1.0]))
+    try:
+        counts = {len(start) for start in declared.hint(box)} - {declared.size} if declared.hint else set()
+    except Exception as cause:
+        raise DeclarationError(f"{what} fails: {cause}", "it gets a box and returns lists of numbers") from cause
     if counts:
-        message = f"the hint of statement {declared.name!r} yields {min(counts)} numbers"
-        raise DeclarationError(message, f"yield {declared.size}, one for each number of its parameters")
+        raise DeclarationError(f"{what} yields {min(counts)} numbers", f"yield {declared.size}, one for each parameter")

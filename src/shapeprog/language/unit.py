@@ -45,10 +45,6 @@ class Unit:
         its size if it is empty."""
         return Unit(name, frame.scale * metres(file or assumed_unit(SPAN * frame.scale)) / metres(name))
 
-    def to(self, name: str) -> Unit:
-        """Another unit of the same object."""
-        return Unit(name, self.per_cell * metres(self.name) / metres(name))
-
 
 def metres(name: str) -> float:
     """The metres of a unit; a ``ShapeProgError`` if there is none of this name."""

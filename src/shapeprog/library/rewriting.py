@@ -15,9 +15,7 @@ from shapeprog.language.ast import (
     Function,
     Line,
     Loop,
-    Part,
     Source,
-    changed_lines,
     names_of,
 )
 from shapeprog.language.convert import named_cells, placed, placed_again
@@ -47,7 +45,7 @@ def with_library(program: Program, library: Library) -> Program:
         cells = _separated(named_cells(original))
     except ShapeProgError:
         return program
-    selected = _with_one_role(_offered(cells, library), library)
+    selected = _offered(cells, library)
 
     def written_with(some: Sequence[Offer]) -> tuple[float, Program]:
         try:
@@ -72,36 +70,13 @@ def _length(program: Program) -> int:
     return length(line for line in source_of(program).lines if not isinstance(line, Function))
 
 
-def _with_one_role(selected: Sequence[Offer], library: Library) -> list[Offer]:
-    """Offers; those of a function with cushions all have the role of its first, which its body contains."""
-    roles: dict[str, str] = {}
-    for offer in selected:
-        roles.setdefault(offer.call.name, offer.call.role)
-    soft = {name for name, item in library.source.functions.items() if any(map(_is_cushion, Source(item.body).walk()))}
-    return [offer for offer in selected if offer.call.name not in soft or roles[offer.call.name] == offer.call.role]
-
-
-def _as_cushion(line: Line, role: str) -> Line:
-    return replace(line, role=role) if isinstance(line, Part) and _is_cushion(line) else line
-
-
-def _is_cushion(line: Line) -> bool:
-    return isinstance(line, Part) and line.role == line.kind == "cushion"
-
-
 def _called(selected: Sequence[Offer], library: Library) -> list[Function]:
-    """The placed functions that calls need, in the order of the library; cushions in them have the role of the call."""
-    roles = {offer.call.name: offer.call.role for offer in selected}
-    names = {*roles}
+    """The placed functions that calls need, in the order of the library."""
+    names = {offer.call.name for offer in selected}
     for function in reversed(library.source.functions.values()):
         if function.name in names:
             names |= {line.name for line in Source(function.body).walk() if isinstance(line, Call)}
-
-    def with_role(function: Function) -> Function:
-        role = roles.get(function.name) or "cushion"
-        return replace(function, body=changed_lines(function.body, lambda line: _as_cushion(line, role)))
-
-    return [with_role(function) for name, function in library.source.functions.items() if name in names]
+    return [function for name, function in library.source.functions.items() if name in names]
 
 
 def _separated(source: Source) -> Source:

@@ -114,7 +114,7 @@ def library_of(program: Program, name: str = "<library>") -> Library:
 def joined(libraries: Iterable[Library]) -> Library:
     """The functions of several libraries as one.
 
-    Of several with one name the first counts; functions that call another of this name are left out.
+    Of several with one name the first counts; functions that call another one of this name are left out.
     """
     result = Source()
     for library in libraries:
@@ -124,7 +124,8 @@ def joined(libraries: Iterable[Library]) -> Library:
             if isinstance(line, Function):
                 called = {inner.name for inner in Source(line.body).walk() if isinstance(inner, Call)}
                 if line.name in result.functions or called & dropped:
-                    dropped.add(line.name)
+                    if result.functions.get(line.name) != line:
+                        dropped.add(line.name)
                     continue
             if not (result.lines and isinstance(line, Assignment)):  # they declare the size of a whole, once
                 lines.append(line)

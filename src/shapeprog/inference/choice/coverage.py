@@ -194,8 +194,11 @@ def square(scene: Scene) -> npt.NDArray[np.bool_]:
 
 
 def protrusion(scene: Scene, evidence: Evidence) -> FloatArray:
-    """How far each candidate (B,) reaches beyond the box around the surface."""
-    centre, reach = scene.centre.numpy(), scene.reach.numpy()
+    """How far the middle of a face of each candidate (B,) is outside the box around the surface.
+
+    The corners of a slanted leg may dip below the floor.
+    """
+    centre, reach = scene.centre.numpy(), (scene.rotation.abs() * scene.bounds[..., None, :]).amax(-1).numpy()
     low, high = evidence.surface.min(0), evidence.surface.max(0)
     beyond = np.maximum(low - (centre - reach), centre + reach - high).max(2)
     result: FloatArray = np.where(scene.mask, beyond, 0.0).max(1, initial=0.0)

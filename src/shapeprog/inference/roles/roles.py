@@ -210,9 +210,9 @@ def turns_of(scene: Scene) -> int:
 
 
 def note_on_front(program: Program) -> str:
-    """A sentence about a back that is not behind; empty if it is, or there is none."""
-    scene = unroll(program)
-    side = ("", "on the left", "in front", "on the right")[turns_of(scene) if scene.mask.any() else 0]
+    """A sentence about the back of a seat or bed that is not behind; empty if it is, or there is none."""
+    scene, sat_on = unroll(program), {"seat", "mattress"}.intersection(draw.word for draw in program.draws)
+    side = ("", "on the left", "in front", "on the right")[turns_of(scene) if sat_on and scene.mask.any() else 0]
     return side and f"Its back seems to be {side}: name the axis that its front faces with --front."
 
 

@@ -27,7 +27,7 @@ class Parts:
     """
 
     def __init__(self, scene: Scene, turns: int = 0) -> None:
-        scene = scene[scene.mask]
+        self.turns, scene = turns, scene[scene.mask]
         half = scene.bounds.double().numpy()
         centre, pose = turned(scene.centre.double().numpy(), turns), turned(scene.rotation.double().mT.numpy(), turns)
         pose = np.swapaxes(pose, -1, -2)

@@ -176,7 +176,7 @@ def roles_of_blocks(program: Program) -> list[str]:
     scene = unroll(program)
     shares = [defaultdict[str, float](float) for _ in range(program.blocks)]
     if scene.mask.any():
-        parts = Parts(scene, turns_of(scene))
+        parts = _facing(scene)
         roles = np.full(parts.count, "", object)
         for role, fits in (("body", anything),) if parts.count == 1 else _kind(parts):
             roles[(roles == "") & fits(parts)] = role
@@ -202,17 +202,18 @@ def _named(draw: Draw, role: str) -> Draw:
     return replace(draw, role="" if role == draw.name else role)
 
 
-def turns_of(scene: Scene) -> int:
-    """By how many quarters about up the frame is turned so that the back, which is on one side alone, is behind."""
-    if _leaned_on(Parts(scene)) > 0:
-        return 0
-    return max((0, 2, 1, 3), key=lambda turns: _leaned_on(Parts(scene, turns)))  # 0 where there is no back
+def _facing(scene: Scene) -> Parts:
+    """The parts unchanged, or in a frame turned by quarters so that the back, which is on one side alone, is behind."""
+    parts = Parts(scene)
+    if _leaned_on(parts) > 0:
+        return parts
+    return max((parts, *(Parts(scene, turns) for turns in (2, 1, 3))), key=_leaned_on)  # unchanged where all are 0
 
 
 def note_on_front(program: Program) -> str:
     """A sentence about the back of a seat or bed that is not behind; empty if it is, or there is none."""
     scene, sat_on = unroll(program), {"seat", "mattress"}.intersection(draw.word for draw in program.draws)
-    side = ("", "on the left", "in front", "on the right")[turns_of(scene) if sat_on and scene.mask.any() else 0]
+    side = ("", "on the left", "in front", "on the right")[_facing(scene).turns if sat_on and scene.mask.any() else 0]
     return side and f"Its back seems to be {side}: name the axis that its front faces with --front."
 
 

@@ -16,7 +16,7 @@ from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.pieces.oriented import Boxes, boxes_around
 from shapeprog.inference.pieces.pieces import Pieces, Source, find_pieces
 from shapeprog.inference.surface.cloud import points_of_scan, projected
-from shapeprog.inference.surface.components import closure, components, solid_sides
+from shapeprog.inference.surface.components import components, enclosed, solid_sides
 from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.space import Array, FloatArray, Frame
 
@@ -234,7 +234,7 @@ def test_faces_of_closed_solids_are_told_which_way_they_face():
     crumpled = box(np.array([0.0, 0, 9]), np.array([1, 1, 0.05]))
     everything = [cube, (turned[0], turned[1][:, ::-1]), rod, sheet, (open_box[0], open_box[1][1:]), crumpled]
     found, whole = (
-        [solid_sides(mesh, *closure(mesh)) for mesh in (components(*each) for each in meshes)]
+        [solid_sides(mesh, enclosed(mesh)) for mesh in (components(*each) for each in meshes)]
         for meshes in (everything, [together(*everything)])
     )
     assert np.bincount(whole[0] + 1).tolist() == [12, 11 + 1 + 12, 12 + 96]

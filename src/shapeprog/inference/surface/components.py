@@ -95,37 +95,35 @@ def _edges(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
     return edge, np.sign(end - start)
 
 
-def solid_sides(mesh: Components, gaps: FloatArray, volume: FloatArray) -> IntArray:
+def solid_sides(mesh: Components, volume: FloatArray) -> IntArray:
     """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
 
-    At each edge of a closed surface, equally many faces run in both directions, and the signed volume is positive if
-    the faces point outwards.  Some 2 % of the edges may be open.  The solid is at least .2 cells thick on average: the
-    sign of the volume of a crumpled sheet is random.  ``gaps`` and ``volume`` are those of :func:`closure`.
+    The signed volume, see :func:`enclosed`, is positive if the faces point outwards.  The solid is at least .2 cells
+    thick on average: the sign of the volume of a crumpled sheet is random.
     """
-    solid = (gaps <= 0.02) & (2 * np.abs(volume) > 0.2 * mesh.area)
-    sides: IntArray = np.repeat(np.where(solid, np.sign(volume), 0).astype(np.int64), np.diff(mesh.start))
-    return sides
+    sign = np.where(2 * np.abs(volume) > 0.2 * mesh.area, np.sign(volume), 0).astype(np.int64)
+    return np.repeat(sign, np.diff(mesh.start))
 
 
-def simple_parts(mesh: Components, gaps: FloatArray, volume: FloatArray, seen: IntArray) -> FloatArray:
-    """Low and high corners (K, 2, 3) of the boxes of closed, visible components that fill most of their box.
-
-    ``gaps`` and ``volume`` are those of :func:`closure`; ``seen`` has the indices of visible faces.
-    """
+def simple_parts(mesh: Components, volume: FloatArray, seen: IntArray) -> FloatArray:
+    """Low and high corners (K, 2, 3) of the boxes of closed components that fill most of their box; ``seen`` has the
+    indices of visible faces, and ``volume`` is what the components enclose."""
     corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
     low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
-    simple = (gaps <= 0.02) & (np.abs(volume) >= 0.5 * (high - low).prod(1))  # a ball fills .52 of its box
+    simple = np.abs(volume) >= 0.5 * (high - low).prod(1)  # a ball fills .52 of its box
     return np.stack([low, high], 1)[simple & np.isin(np.arange(len(first)), mesh.component_of(seen))]
 
 
-def closure(mesh: Components) -> tuple[FloatArray, FloatArray]:
-    """The share of open edges of each component (K,), and its signed volume."""
-    counts = np.diff(mesh.start)
-    component = np.repeat(np.arange(len(counts)), counts)
+def enclosed(mesh: Components) -> FloatArray:
+    """The signed volume of each component (K,), NaN if it is open.
+
+    At each edge of a closed surface, equally many faces run in both directions; some 2 % of the edges may be open.
+    """
     edge, direction = _edges(mesh.faces, len(mesh.vertices))
-    uneven = np.bincount(edge, direction) != 0
-    gaps = np.bincount(np.repeat(component, 3), uneven[edge], minlength=len(counts)) / (3 * counts)
-    return gaps, np.add.reduceat(np.linalg.det(mesh.vertices[mesh.faces]), mesh.start[:-1]) / 6
+    open_edges = (np.bincount(edge, direction) != 0)[edge].reshape(-1, 3).sum(1)
+    gaps = np.add.reduceat(open_edges, mesh.start[:-1]) / (3 * np.diff(mesh.start))
+    volume = np.add.reduceat(np.linalg.det(mesh.vertices[mesh.faces]), mesh.start[:-1]) / 6
+    return np.where(gaps <= 0.02, volume, np.nan)
 
 
 def linked(pairs: Array, count: int) -> IntArray:

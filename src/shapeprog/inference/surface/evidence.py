@@ -16,7 +16,7 @@ from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import triangle_normals, union_mesh
 from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
-from shapeprog.inference.surface.components import Components, IntArray, closure, components, simple_parts, solid_sides
+from shapeprog.inference.surface.components import Components, IntArray, components, enclosed, simple_parts, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
@@ -91,8 +91,8 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     """The evidence of a mesh: samples by area; cells are free where they are visible from outside."""
     samples, face = sample_with_faces(mesh.vertices, mesh.faces, SURFACE.surface, seed)
     surface, corners = samples.astype(np.float64), mesh.vertices[mesh.faces]
-    closed = closure(mesh)
-    sides, (_, facing) = solid_sides(mesh, *closed), triangle_normals(mesh.vertices, mesh.faces)
+    volume, (_, facing) = enclosed(mesh), triangle_normals(mesh.vertices, mesh.faces)
+    sides = solid_sides(mesh, volume)
     normals = np.where(sides < 0, -1, 1)[face, None] * facing[face]
     barrier = np.zeros((SURFACE.looking,) * 3, np.bool_)
     # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
@@ -107,7 +107,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
         surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
         area * float(weights.mean()), _free_cells(coarse, surface, through=False),
-        simple_parts(mesh, *closed, face[: SURFACE.points][front | back])[:64], mesh,
+        simple_parts(mesh, volume, face[: SURFACE.points][front | back])[:64], mesh,
     )  # fmt: skip
 
 

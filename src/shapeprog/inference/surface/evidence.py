@@ -33,8 +33,7 @@ class Evidence:
     Parameters
     ----------
     points, normals, weights
-        Points (P, 3) to be explained, their unit normals (P, 3), zero where unknown; and weights (P,) with
-        sum 1.
+        Points (P, 3) to be explained, their unit normals (P, 3), zero where unknown, and weights (P,) with sum 1.
     outward
         Whether a normal is known to point outwards (P,); others are of either sign.
     tolerance, agreement
@@ -48,7 +47,7 @@ class Evidence:
     area
         Area in square cells of the surface that the points represent, in proportion to their weights.
     free
-        Cells (R, R, R) of the cube of the grid that are known to be free; other space may be free or not.
+        Cells (R, R, R) of the grid that are known to be free; only those in the box around the surface count.
     parts
         Low and high corners (K, 2, 3) of the boxes of components of simple form, the 64 largest at most; none of scans.
     mesh
@@ -152,8 +151,8 @@ def _of_cells(voxels: Flags) -> Evidence:
 def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: int = 0) -> npt.NDArray[np.float32]:
     """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
 
-    Uniform on the exposed faces of the cells, moved inwards by ``depth``; a face at the end of the
-    longest side is exact, since that side is 24 cells long by definition, and stays.
+    Uniform on the exposed faces of the cells, moved inwards by ``depth`` but for those at the ends of the longest side,
+    which is 24 cells long by definition.
     """
     occupied, random, faces = np.argwhere(voxels), np.random.default_rng(seed), _exposed_faces(voxels)
     selected = random.integers(len(faces[0]), size=count)
@@ -211,18 +210,15 @@ def _within(cells: Flags, points: FloatArray) -> Flags:
 
 
 def _free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
-    """The cells (R, R, R) from which enough directions lead out of the grid; with ``through``, both ways.
-
-    Cells outside the bounding box of the surface are free; with ``through``, for scans, they are not, as parts of the
-    shape may be missing from a scan.
-    """
+    """The cells (R, R, R) in the box around the surface from which enough directions lead out of the grid; with
+    ``through``, both ways: parts of a shape may be missing from its scan."""
     scale = len(barrier) / RESOLUTION
     low, high = ((end + HALF) * scale for end in (surface.min(0), surface.max(0)))
     starts = np.argwhere(np.ones_like(barrier)) + 0.5
-    within = ((starts >= low) & (starts <= high)).all(1).reshape(barrier.shape)
-    free: Flags = ~(barrier | within) & (not through)
+    within = ((starts >= low) & (starts <= high)).all(1)
     steps, minimum = (directions()[::2], 4) if through else (directions(), 2)
-    free[within] = looking(barrier, starts[within.reshape(-1)], steps, minimum, through=through)
+    free = np.zeros_like(barrier)
+    free[within.reshape(free.shape)] = looking(barrier, starts[within], steps, minimum, through=through)
     return free
 
 

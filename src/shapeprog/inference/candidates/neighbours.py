@@ -99,8 +99,7 @@ def recounted(chain: Chain, more: int) -> Iterator[Node]:
             yield nest((*outer, *inner))
             for box in solid_boxes([chain[-1]])[0][:1]:
                 moved = box._replace(centre=box.centre - more * np.array(step))
-                for drawing in hinted(language()[chain[-1].name], moved):
-                    yield nest((*outer, *inner[:-1], drawing))
+                yield from redrawn((*outer, *inner), moved)
 
 
 def _filled(chain: Chain) -> Iterator[Node]:

@@ -129,7 +129,7 @@ def _drawing_the_same(candidates: Sequence[Draw], node: Draw, signs: FloatArray)
     """The candidates that draw a node, or its mirror image by these signs of the coordinates, with its role."""
     if not candidates:
         return
-    sample = sample_surface(scene_of([node]), SETTINGS.equal_points, torch.Generator().manual_seed(0))
+    sample = sample_surface(scene_of([node]), SETTINGS.points, torch.Generator().manual_seed(0))
     points = sample.points.double() * torch.from_numpy(signs)
     ((box, *_),) = solid_boxes([node])
     limit = min(SETTINGS.equal_distance, SETTINGS.equal_share * box.half.min())

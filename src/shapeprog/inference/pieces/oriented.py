@@ -49,16 +49,10 @@ def join(parts: Sequence[Boxes]) -> Boxes:
 
 
 def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor: float = SETTINGS.thin) -> Boxes:
-    """A small box around each set of points, along the world's axes or turned about one of them where that is small.
+    """A small box around each set of points (P, 3), along the world's axes, or turned where it is much smaller then.
 
-    Parameters
-    ----------
-    sets
-        Points (P, 3) of each of G sets, none of them empty.
-    frames
-        Frames (G, 3, 3) about whose last axis the boxes are turned instead.
-    floor
-        Shorter sides count as so long in the selection of directions.
+    With ``frames`` (G, 3, 3) of all sets, boxes are turned only about the last axes of these.  In the selection of
+    directions, sides shorter than ``floor`` count as so long.
     """
     if not sets:
         return join([])

@@ -99,20 +99,12 @@ def turn_each(points, start, directions, frames, kind, floor, rotation):
     """The axes of a small oriented box around each run of points.
 
     The world's axes where no other direction is much better, then one turned about one of them, then the smallest.
+    Run g has the points (P, 3) from ``start[g]`` to ``start[g + 1] - 1``, at least one; those farthest out along some
+    ``directions`` (3, D), one of each opposite pair, define its box.  Sides shorter than ``floor`` count as so long.
 
-    Parameters
-    ----------
-    points, start
-        Points (P, 3); run g holds those from ``start[g]`` to ``start[g + 1] - 1``, at least one.
-    directions
-        Unit vectors (3, D), one of each opposite pair, that define the outermost points.
-    frames, kind
-        Frames (G, 3, 3) and kinds (G,): ``COMPACT``, initial principal axes, longest first; ``ROD``, the same of a long
-        thin part, whose first axis is preferred to that of the smallest box; ``FLAT``, turned only about the last axis.
-    floor
-        Smallest side: thinner boxes count as flat.
-    rotation
-        Output (G, 3, 3), axes as columns.
+    The ``frames`` (G, 3, 3) of ``COMPACT`` runs are principal axes, longest first, from which the search starts too; in
+    those of a ``ROD``, the first axis is preferred to that of the smallest box; those that are ``FLAT`` are turned only
+    about their last axis.  The output ``rotation`` (G, 3, 3) has axes as columns.
     """
     for g in range(len(start) - 1):
         own, flattened = outermost(points[start[g] : start[g + 1]], directions), kind[g] == FLAT

@@ -11,22 +11,9 @@ from shapeprog.kernels.compile import kernel
 def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size, label):
     """Label points by the planar patch they belong to.
 
-    A patch grows from a seed to neighbours that lie in its plane and face its way, while the plane follows its points.
-
-    Parameters
-    ----------
-    points, normals
-        Points (N, 3) and unit normals (N, 3) of either sign.
-    neighbours
-        Indices (N, k) of neighbouring points.
-    order
-        Seeds, the flattest first.
-    cosine, tolerance
-        How well a point's normal agrees with the plane's, and how far it may lie from it.
-    min_size
-        Points of the smallest patch.
-    label
-        Output (N,), initially -1, and afterwards for points of no patch.
+    A patch grows from a seed, of which the flattest are first in ``order``, to neighbours (N, k) within ``tolerance``
+    of its plane, whose normals, of either sign, have at least this cosine with its own, while the plane follows its
+    points.  The output ``label`` (N,) is initially -1, and stays so for points of patches smaller than ``min_size``.
     """
     stack = np.empty(len(points), np.int64)
     mean, total, normal = np.empty(3), np.empty(3), np.empty(3)
@@ -73,18 +60,8 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size
 def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
     """Which points are near the surface of each box, and the share of the box's surface near which points lie.
 
-    The surface is divided into squares of about two cells, at most eight along a side.
-
-    Parameters
-    ----------
-    points
-        Points (N, 3) of a surface.
-    centre, rotation, half
-        Boxes (B, 3), (B, 3, 3) with axes as columns, and (B, 3).
-    tolerance
-        Largest distance of a point from the surface that explains it.
-    explained, fill
-        Output (B, N) and (B,), initially false.
+    Points (N, 3) are near within ``tolerance``.  The surface is divided into squares of about two cells, at most eight
+    along a side.  The outputs ``explained`` (B, N) and ``fill`` (B,) are initially zero.
     """
     covered, at = np.empty((6, 8, 8), np.bool_), np.empty(3)
     count, square = np.empty(3, np.int64), np.empty(3, np.int64)

@@ -28,46 +28,22 @@ Flags = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Evidence:
-    """Evidence of a target, in the grid frame.
+    """Evidence of a target, in the grid frame."""
 
-    Parameters
-    ----------
-    points, normals, weights
-        Points (P, 3) to be explained, their unit normals (P, 3), zero where unknown, and weights (P,) with sum 1.
-    outward
-        Whether a normal is known to point outwards (P,); others are of either sign.
-    tolerance, agreement
-        A surface explains a point within this distance, if the cosine between the normals is at least this.
-    surface, surface_normals, reach
-        The same surface as more points (Q, 3): they support the surface of a program where one of them is within
-        ``reach`` and has a matching normal.
-    surface_outward
-        Whether a normal is known to point outwards (Q,), as it bounds a solid: a surface of a program that faces the
-        other way pays three quarters of the price there.
-    area
-        Area in square cells of the surface that the points represent, in proportion to their weights.
-    free
-        Cells (R, R, R) of the grid that are known to be free; only those in the box around the surface count.
-    parts
-        Low and high corners (K, 2, 3) of the boxes of components of simple form, the 64 largest at most; none of scans.
-    mesh
-        The components of the target, if it is a mesh.
-    """
-
-    points: FloatArray
-    normals: FloatArray
-    weights: FloatArray
-    outward: Flags
-    tolerance: float
-    agreement: float
-    surface: FloatArray
-    surface_normals: FloatArray
-    surface_outward: Flags
-    reach: float
-    area: float
-    free: Flags
-    parts: FloatArray
-    mesh: Components | None = None
+    points: FloatArray  # points (P, 3) to be explained
+    normals: FloatArray  # their unit normals (P, 3), zero where unknown
+    weights: FloatArray  # their weights (P,), whose sum is 1
+    outward: Flags  # whether a normal is known to point outwards (P,); others are of either sign
+    tolerance: float  # distance within which a surface explains a point
+    agreement: float  # least cosine between normals that agree
+    surface: FloatArray  # more points (Q, 3) of the same surface: that of a program is supported by those near it
+    surface_normals: FloatArray  # their unit normals (Q, 3), with which its own must agree
+    surface_outward: Flags  # whether a normal is known to point outwards (Q,), as it bounds a solid
+    reach: float  # distance within which one of these points supports a surface
+    area: float  # of the surface that the points represent, in proportion to their weights, in square cells
+    free: Flags  # cells (R, R, R) of the grid that are known to be free; only those in the box of the surface count
+    parts: FloatArray  # low and high corners (K, 2, 3) of the boxes of components of simple form, 64 at most
+    mesh: Components | None = None  # the components of the target, if it is a mesh
 
 
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:

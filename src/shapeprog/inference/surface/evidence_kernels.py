@@ -7,20 +7,11 @@ from shapeprog.kernels.compile import kernel
 
 @kernel("void(b1[:, :, ::1], f8[:, ::1], f8[:, ::1], i8, b1, b1[::1], i8, i8)")
 def look_out(barrier, starts, directions, minimum, through, out, begin, end):
-    """Mark the starts ``begin`` to ``end`` from which at least ``minimum`` directions lead out of the grid.
+    """Mark the starts ``begin`` to ``end`` of (N, 3) from which at least ``minimum`` directions lead out of the grid.
 
-    Steps are one cell along the longest axis of a direction, so no ray slips through a wall of touched cells.
-
-    Parameters
-    ----------
-    barrier
-        Cells (R, R, R) that stop a ray.
-    starts
-        Starts of rays (N, 3), in cells from the corner of the grid; from inside a barrier none leads out.
-    directions
-        Steps (D, 3), of which the largest coordinate is 1 or -1.
-    through
-        Whether the way back along a direction must be clear as well.
+    Starts are in cells from the corner of the grid, whose cells (R, R, R) of a ``barrier`` stop a ray; from inside it
+    none leads out.  The largest coordinate of directions (D, 3) is 1 or -1: no ray slips through a wall of touched
+    cells.  With ``through``, the way back along a direction must be clear as well.
     """
     size = len(barrier)
     for item in range(begin, end):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -94,10 +94,10 @@ def simplest(node: Node) -> Node:
     """
     if isinstance(node, Loop):
         return Loop(node.name, node.values, tuple(simplest(inner) for inner in node.body))
-    if language()[node.name].pivot is not None:
-        return node
     (boxes,) = solid_boxes([node])
-    same = list(_drawing_the_same(drawings(boxes[0]), node, np.ones(3))) if len(boxes) == 1 else []
+    if len(boxes) != 1 or language()[node.name].pivot is not None:
+        return node
+    same = _drawing_the_same(drawings(boxes[0]), node, boxes[0], np.ones(3))
     if not same or is_unhinted(language()[node.name]):  # those of the paper are written as a solid with a role
         same.append(node)
     return min(same, key=numbers_written)
@@ -121,18 +121,16 @@ def canonical_side(node: Node) -> Node:
         return node
     turn = signs[:, None] * box.rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
     image = Box(signs * box.centre, turn, box.half)
-    match = next(_drawing_the_same(hinted(language()[drawing.name], image), drawing, signs), None)
-    return node if match is None else nest((*loops, match))
+    same = _drawing_the_same(hinted(language()[drawing.name], image), drawing, image, signs)
+    return nest((*loops, same[0])) if same else node
 
 
-def _drawing_the_same(candidates: Sequence[Draw], node: Draw, signs: FloatArray) -> Iterator[Draw]:
-    """The candidates that draw a node, or its mirror image by these signs of the coordinates, with its role."""
+def _drawing_the_same(candidates: Sequence[Draw], node: Draw, box: Box, signs: FloatArray) -> list[Draw]:
+    """The candidates that draw a node, or its mirror image by signs of the coordinates, in a box; with its role."""
     if not candidates:
-        return
+        return []
     sample = sample_surface(scene_of([node]), SETTINGS.points, torch.Generator().manual_seed(0))
     points = sample.points.double() * torch.from_numpy(signs)
-    ((box, *_),) = solid_boxes([node])
     limit = min(SETTINGS.equal_distance, SETTINGS.equal_share * box.half.min())
     off = signed_distance(scene_of(candidates), points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
-    same = (candidate for candidate, far in zip(candidates, off, strict=True) if far < limit)
-    yield from (replace(candidate, role=node.role) for candidate in same)
+    return [replace(candidate, role=node.role) for candidate, far in zip(candidates, off, strict=True) if far < limit]

@@ -6,7 +6,7 @@ Boxes of several sources overlap, and most are wrong: the selection of candidate
 from __future__ import annotations
 
 from enum import IntEnum
-from itertools import pairwise
+from itertools import compress, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -108,10 +108,9 @@ def _of_mesh(mesh: Components) -> tuple[Cloud, list[tuple[Source, Boxes]]]:
     boxes = boxes_around([mesh.vertices[np.unique(mesh.faces[first:last])] for first, last in runs])
     samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, 0)]
     counts = np.bincount(mesh.component_of(samples[0][1]), minlength=len(runs))
-    for (first, last), count in zip(runs, counts, strict=False):
-        if count < SETTINGS.component_points:
-            points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, 0)
-            samples.append((points, face + first))
+    for first, last in compress(runs, counts < SETTINGS.component_points):
+        points, face = sample_with_faces(mesh.vertices, mesh.faces[first:last], SETTINGS.component_points, 0)
+        samples.append((points, face + first))
     points, face = (np.concatenate(column) for column in zip(*samples, strict=True))
     cloud = cloud_of(points, triangle_normals(mesh.vertices, mesh.faces[face])[1])
     return cloud, [(Source.COMPONENT, boxes), (Source.GROUP, groups(boxes)), *_of_points(cloud, join([]))]

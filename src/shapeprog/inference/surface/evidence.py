@@ -124,13 +124,13 @@ def _of_cells(voxels: Flags) -> Evidence:
     )  # fmt: skip
 
 
-def points_of_cells(voxels: npt.NDArray[np.bool_], count: int = 5000, *, seed: int = 0) -> npt.NDArray[np.float32]:
+def points_of_cells(voxels: Flags, count: int = 5000) -> npt.NDArray[np.float32]:
     """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
 
     Uniform on the exposed faces of the cells, moved inwards by ``depth`` but for those at the ends of the longest side,
     which is 24 cells long by definition.
     """
-    occupied, random, faces = np.argwhere(voxels), np.random.default_rng(seed), _exposed_faces(voxels)
+    occupied, random, faces = np.argwhere(voxels), np.random.default_rng(0), _exposed_faces(voxels)
     selected = random.integers(len(faces[0]), size=count)
     axis, above, cells, exact = (column[selected] for column in faces)
     inwards = np.where(exact, 0.0, SURFACE.depth)

@@ -69,10 +69,8 @@ def turned(points, frame, axis, floor):
             break
         length = np.sqrt(u * u + v * v)
         x, y, corner = u / length, v / length, after
-    if abs(sine) > abs(cosine):  # the same rectangle, turned by less
-        cosine, sine = (sine, -cosine) if sine > 0 else (-sine, cosine)
-    if cosine < 0:
-        cosine, sine = -cosine, -sine
+    while abs(sine) > cosine:  # the same rectangle, turned by less
+        cosine, sine = sine, -cosine
     result = frame.copy()
     for row in range(3):
         u, v = frame[row, first], frame[row, second]
@@ -126,6 +124,4 @@ def turn_each(points, start, directions, frames, kind, floor, rotation):
                 trial = turned(own, frames[g], 0, floor)
                 if volume(own, trial, floor) < SLACK * best:
                     frame = trial
-        for row in range(3):
-            for axis in range(3):
-                rotation[g, row, axis] = frame[row, axis]
+        rotation[g] = frame

@@ -29,15 +29,11 @@ def is_unhinted(declared: Statement) -> bool:
     return declared.hint is None and not declared.is_loop and declared.id > END
 
 
-def drawings(box: Box) -> list[Draw]:
-    """The drawings of a box by all statements that have a hint."""
-    return [drawing for declared in language() for drawing in hinted(declared, box)]
-
-
-def hinted(declared: Statement, box: Box) -> list[Draw]:
-    """The drawings of a box by the hint of a statement; empty without a hint."""
-    values = () if declared.hint is None else declared.hint(box)
-    return [Draw(declared.name, tuple(np.array(numbers, np.float32).tolist())) for numbers in values]
+def drawings(box: Box, *names: str) -> list[Draw]:
+    """The drawings of a box by the hints of these statements, by default of all; none by those without a hint."""
+    statements = [language()[name] for name in names] or language()
+    rows = [(declared.name, values) for declared in statements if declared.hint for values in declared.hint(box)]
+    return [Draw(name, tuple(np.array(values, np.float32).tolist())) for name, values in rows]
 
 
 def starts(declared: Statement, box: Box) -> list[Draw]:
@@ -121,7 +117,7 @@ def canonical_side(node: Node) -> Node:
         return node
     turn = signs[:, None] * box.rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
     image = Box(signs * box.centre, turn, box.half)
-    same = _drawing_the_same(hinted(language()[drawing.name], image), drawing, image, signs)
+    same = _drawing_the_same(drawings(image, drawing.name), drawing, image, signs)
     return nest((*loops, same[0])) if same else node
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -91,14 +90,14 @@ def _runs(nodes: Sequence[Node]) -> list[Node]:
     """Loops over candidates that are copies of each other at equal steps, the longest first."""
     if len(nodes) < 2:
         return []
-    profile, step_of = profiles(nodes), dict[tuple[int, ...], FloatArray]()
-    kind, _, half, distance = profile
+    kind, middle, half, distance = profiles(nodes)
+    step_of: dict[tuple[int, ...], FloatArray] = {}
     copies = cdist(half, half, "chebyshev") <= SETTINGS.alike * np.linalg.norm(half, axis=1)[:, None]
     copies &= (cdist(distance, distance, "chebyshev") <= SETTINGS.level) & (kind[:, None] == kind)
     groups = {tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in copies}
     for group in sorted(group for group in groups if len(group) > 1):
-        positions = profile.middle[list(group)]
-        for run in equal_steps(positions, profile.half[group[0]]):
+        positions = middle[list(group)]
+        for run in equal_steps(positions, half[group[0]]):
             members = tuple(group[index] if index >= 0 else -1 for index in run)
             step_of.setdefault(members, (positions[run[-1]] - positions[run[0]]) / (len(run) - 1))
     longest = sorted(step_of, key=lambda members: (-len(members), members))[: SETTINGS.most_runs]
@@ -144,7 +143,7 @@ def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
     for k in np.flatnonzero((number <= end) & enough):
         row = members[k, : end[k] + 1]
         runs.append((row if forwards[k] else row[::-1]).tolist())
-    return [list(members) for members in dict.fromkeys(map(tuple, runs))]
+    return runs
 
 
 def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
@@ -218,9 +217,8 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
             index = kept(index, _turned(points[index], axis, copy * step))
         between = kept(index, _turned(points[index], axis, step / 2))
         index = np.setdiff1d(index, between)  # there are no copies on a round surface
-        values = (count, 1) if not axis.any() else (count, 360 / count, *axis)
-        loop = Loop("rotate" if not axis.any() else "rotate_about", loop_values(*values), ())
-        result += [replace(loop, body=(nodes[k],)) for k in index.tolist()]
+        name, values = ("rotate_about", (count, 360 / count, *axis)) if axis.any() else ("rotate", (count, 1))
+        result += [Loop(name, loop_values(*values), (nodes[k],)) for k in index.tolist()]
     return result
 
 

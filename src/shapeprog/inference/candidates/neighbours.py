@@ -17,7 +17,7 @@ import torch
 from scipy.spatial import cKDTree
 
 from shapeprog.geometry.distance import signed_distance
-from shapeprog.inference.candidates.drawings import drawings, hinted, solid_boxes
+from shapeprog.inference.candidates.drawings import drawings, solid_boxes
 from shapeprog.inference.candidates.loops import images, mirror, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
@@ -26,7 +26,6 @@ from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Loop, Node, Program, nest
-from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
@@ -45,14 +44,14 @@ def neighbours(program: Program) -> list[Node]:
         if box is not None:
             parts = [part for k, solids in enumerate(block_boxes) if k != index for part in solids]
             result += [nest((*chain[:-1], drawing)) for drawing in drawings(box)]
-            edited = list(met(box, parts))
-            edited += [middle for candidate in [box, *edited] for middle in centred(candidate)]
+            edited = [box, *met(box, parts)]
+            edited += [middle for candidate in edited for middle in centred(candidate)]
             result += [node for candidate in edited for node in redrawn(chain, candidate)]
             result += [*recounted(chain, -1), *recounted(chain, 1), *_filled(chain)]
     for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
         if box is not None and other_box is not None and _loops(chain) == _loops(other):
-            merged = (drawing for around in _merged(box, other_box) for drawing in drawings(around))
-            result += [nest((*chain[:-1], drawing)) for drawing in merged]
+            for around in _merged(box, other_box):
+                result += [nest((*chain[:-1], drawing)) for drawing in drawings(around)]
     existing = set(program.body)
     return [node for node in dict.fromkeys(result) if node not in existing]
 
@@ -67,7 +66,7 @@ def shorter(node: Node) -> Iterator[Node]:
 
 def redrawn(chain: Chain, box: Box) -> Iterator[Node]:
     """A block whose statement draws another box inside its loops; by all statements if its hint gives none."""
-    for drawing in hinted(language()[chain[-1].name], box) or drawings(box):
+    for drawing in drawings(box, chain[-1].name) or drawings(box):
         yield nest((*chain[:-1], drawing))
 
 
@@ -94,12 +93,11 @@ def recounted(chain: Chain, more: int) -> Iterator[Node]:
     """A run with so many copies more, at its end or at its beginning."""
     for index, loop in enumerate(chain[:-1]):
         if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2:
-            count, step = float(loop.count + more), loop.values[1:]
-            outer, inner = (*chain[:index], replace(loop, values=(count, *step))), chain[index + 1 :]
-            yield nest((*outer, *inner))
+            values = float(loop.count + more), *loop.values[1:]
+            changed = (*chain[:index], replace(loop, values=values), *chain[index + 1 :])
+            yield nest(changed)
             for box in solid_boxes([chain[-1]])[0][:1]:
-                moved = box._replace(centre=box.centre - more * np.array(step))
-                yield from redrawn((*outer, *inner), moved)
+                yield from redrawn(changed, box._replace(centre=box.centre - more * np.array(values[1:])))
 
 
 def _filled(chain: Chain) -> Iterator[Node]:
@@ -153,8 +151,7 @@ def met(
             for end in sorted(ends[ends > minimum].tolist(), key=lambda end: abs(end - box.half[axis]))[:4]:
                 length = (box.half[axis] + end) / 2
                 if abs(end - box.half[axis]) <= SETTINGS.reach and length >= SETTINGS.shortest / 2:
-                    half = box.half.copy()
-                    half[axis] = length
+                    half = np.where(np.arange(3) == axis, length, box.half)
                     yield Box(box.centre + (end - box.half[axis]) / 2 * along, box.rotation, half)
 
 
@@ -168,11 +165,9 @@ def centred(box: Box) -> Iterator[Box]:
         off = abs(float(box.centre[axis]))
         near = SETTINGS.off_least < off < min(SETTINGS.off_most, box.half[along] / 2)
         if near and np.abs(box.rotation[axis, along]) >= STRAIGHT:
+            centre = np.where(np.arange(3) == axis, 0, box.centre)
             for more in (-off, off):
-                centre, half = box.centre.copy(), box.half.copy()
-                centre[axis] = 0
-                half[along] += more
-                yield Box(centre, box.rotation, half)
+                yield Box(centre, box.rotation, box.half + more * np.eye(3)[along])
 
 
 def _crossed(starts: FloatArray, along: FloatArray, parts: Box) -> FloatArray:

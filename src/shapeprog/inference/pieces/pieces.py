@@ -124,7 +124,7 @@ def _of_points(cloud: Cloud, along: Boxes) -> list[tuple[Source, Boxes]]:
     between = slabs(patches)
     support = Support(cloud, between)
     selected = np.flatnonzero(support.filled)
-    selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[: SETTINGS.slabs]]
+    selected = selected[np.argsort(-support.explained[selected].sum(1), kind="stable")[: SETTINGS.pieces]]
     parts = [
         (Source.ROD, rods(cloud)),
         (Source.LIMB, along),

@@ -15,7 +15,6 @@ class Settings:
     component_points: int = 48  # the same of a component, at least
     least_points: int = 32  # points from which a surface is estimated, at least
     components: int = 300  # pieces of each source, and of all, at most
-    slabs: int = 600
     sheets: int = 60
     limbs: int = 100
     rods: int = 60

@@ -111,8 +111,7 @@ def _of_cells(voxels: Flags) -> Evidence:
 
     Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
     """
-    axis, above, cells, exact = _exposed_faces(voxels)
-    normals = np.where(above, 1, -1)[:, None] * np.eye(3)[axis]
+    normals, cells, exact = _exposed_faces(voxels)
     single = ~np.pad(voxels, 1)[tuple((cells + 1 - normals.astype(np.int64)).T)]  # one cell thick
     inset = np.where(exact, 0.0, np.where(single, 0.15, SURFACE.inset))
     surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
@@ -132,24 +131,23 @@ def points_of_cells(voxels: Flags, count: int = 5000) -> npt.NDArray[np.float32]
     """
     occupied, random, faces = np.argwhere(voxels), np.random.default_rng(0), _exposed_faces(voxels)
     selected = random.integers(len(faces[0]), size=count)
-    axis, above, cells, exact = (column[selected] for column in faces)
-    inwards = np.where(exact, 0.0, SURFACE.depth)
-    points = cells + random.random((count, 3))
-    points[np.arange(count), axis] = cells[np.arange(count), axis] + np.where(above, 1 - inwards, inwards)
+    normals, cells, exact = (column[selected] for column in faces)
+    outwards = 0.5 - np.where(exact, 0.0, SURFACE.depth)
+    points = cells + np.where(normals, 0.5 + outwards[:, None] * normals, random.random((count, 3)))
     low, high = occupied.min(0), occupied.max(0) + 1
     margin = np.where(high - low == SPAN, 0.0, SURFACE.depth)
     return (np.clip(points, low + margin, high - margin) - HALF).astype(np.float32)
 
 
-def _exposed_faces(voxels: Flags) -> tuple[IntArray, Flags, IntArray, Flags]:
-    """The axis of each exposed face of cells (F,), whether it is above its cell (F,), the cell (F, 3), and whether it
-    is at an end of a longest side (F,)."""
+def _exposed_faces(voxels: Flags) -> tuple[FloatArray, IntArray, Flags]:
+    """The normal (F, 3) of each exposed face of cells, its cell (F, 3), and whether it is at an end of a longest side
+    (F,)."""
     padded, occupied = np.pad(voxels, 1), np.argwhere(voxels)
     sides = [[voxels & ~np.roll(padded, by, axis)[1:-1, 1:-1, 1:-1] for by in (1, -1)] for axis in range(3)]
     axis, above, *cell = np.argwhere(sides).T
     low, high = occupied.min(0)[axis], occupied.max(0)[axis]
     exact = (high - low == SPAN - 1) & (np.choose(axis, cell) == np.where(above, high, low))
-    return axis, above == 1, np.stack(cell, 1), exact
+    return np.where(above, 1, -1)[:, None] * np.eye(3)[axis], np.stack(cell, 1), exact
 
 
 def _reach(tolerance: float, area: float, count: int) -> float:

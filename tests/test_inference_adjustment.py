@@ -147,7 +147,7 @@ def test_joints_are_points_where_parts_touch_or_nearly_do():
         tunable = Tunable(parse(stacked.format(height)))
         poses = tunable.poses(tunable.values)
         known = find_joints(poses.scene, -12.0)
-        gaps = needs(poses.scene, poses.slopes, known).residual
+        gaps = needs(poses, known)[0]
         assert len(known.pairs) == count
         assert known.standing.tolist() == [0]
         assert gaps[:count].tolist() == pytest.approx([height + 4.02] * count, abs=1e-3)

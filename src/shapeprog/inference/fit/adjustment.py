@@ -107,15 +107,15 @@ def of_joints(poses: Poses, joints: Joints, closing: bool) -> System:
     At the end the gaps up to a cell that would divide the program are closed, and feet up to .15 cells above the floor
     are put on it.
     """
-    gaps = needs(poses.scene, poses.slopes, joints)
-    weight = 0.003 * (FIT.nearly**2 / (FIT.nearly**2 + gaps.residual**2)) ** 2
+    residual, slopes = needs(poses, joints)
+    weight = 0.003 * (FIT.nearly**2 / (FIT.nearly**2 + residual**2)) ** 2
     if closing:
         count = len(joints.pairs)
-        needed = joining(joints.pairs, gaps.residual[:count], len(poses.scene.mask), 1.0)
-        needed = torch.cat([needed, gaps.residual[count:].abs() < 0.15])
+        needed = joining(joints.pairs, residual[:count], len(poses.scene.mask), 1.0)
+        needed = torch.cat([needed, residual[count:].abs() < 0.15])
         weight = torch.where(needed, 0.03, weight)
-    weighted = weight[:, None] * gaps.slopes
-    return weighted.T @ gaps.residual, weighted.T @ gaps.slopes
+    weighted = weight[:, None] * slopes
+    return weighted.T @ residual, weighted.T @ slopes
 
 
 def _move(

@@ -20,6 +20,7 @@ from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.settings import FIT
+from shapeprog.inference.fit.tunable import Poses
 
 
 class Joints(NamedTuple):
@@ -41,13 +42,6 @@ class Joints(NamedTuple):
     normalized: Float[Tensor, "C 3"]
     standing: Int[Tensor, " S"]
     floor: float
-
-
-class Needs(NamedTuple):
-    """Residuals of joints (C + S,), in cells, and their derivatives (C + S, F) by the numbers."""
-
-    residual: Float[Tensor, " R"]
-    slopes: Float[Tensor, "R F"]
 
 
 def find_joints(scene: Scene, floor: float) -> Joints:
@@ -82,19 +76,23 @@ def moved(scene: Scene, joints: Joints) -> Joints:
     return joints._replace(normalized=_inner(scene[joints.pairs[:, 0]], points))
 
 
-def needs(scene: Scene, slopes: Float[Tensor, "N 16 F"], joints: Joints) -> Needs:
-    """Gap of every joint, zero if it is closed, and height above the floor of every part that should touch it."""
-    (first, by_first), (second, by_second) = (_rows_of(scene, slots) for slots in joints.pairs.unbind(1))
-    gap = signed_distance(second, _placed(first, joints.normalized)[:, None])[:, 0]
-    gap = gap + 0.02  # into the other part, by more than rounding takes away
-    on_first, on_second = torch.autograd.grad(gap.sum(), [by_first, by_second])
-    joined = _by_number(on_first, slopes[joints.pairs[:, 0]]) + _by_number(on_second, slopes[joints.pairs[:, 1]])
-    joined = torch.where((gap >= 0)[:, None], joined, 0.0)  # on an axis the slope of a depth is no number
-    feet, by_feet = _rows_of(scene, joints.standing)
-    standing = scene[joints.standing]
-    height = _placed(feet, _inner(standing, _lowest(standing)))[:, 0] - joints.floor
-    lifted = _by_number(torch.autograd.grad(height.sum(), by_feet)[0], slopes[joints.standing])
-    return Needs(torch.cat([gap.clamp(min=0), height]).detach(), torch.cat([joined, lifted]))
+def needs(poses: Poses, joints: Joints) -> tuple[Float[Tensor, " R"], Float[Tensor, "R F"]]:
+    """Gap of every joint, zero if it is closed, then height above the floor of every part that should touch it, in
+    cells (C + S,); and their derivatives (C + S, F) by the numbers."""
+    scene, slopes = poses
+    (first, second), standing = joints.pairs.unbind(1), scene[joints.standing]
+    bearing = torch.cat([first, joints.standing])  # the primitives on which the points are
+    normalized = torch.cat([joints.normalized, _inner(standing, _lowest(standing))])
+    (parts, rows), (others, other_rows) = _rows_of(scene, bearing), _rows_of(scene, second)
+    points = _placed(parts, normalized)
+    into = points[: len(second)]
+    gap = signed_distance(others, into[:, None])[:, 0] + 0.02  # by more than rounding takes away
+    height = points[len(second) :, 0] - joints.floor
+    by_rows, by_other = torch.autograd.grad(gap.sum() + height.sum(), [rows, other_rows])
+    by_number = (by_rows[:, None] @ slopes[bearing])[:, 0]
+    by_number[: len(second)] += (by_other[:, None] @ slopes[second])[:, 0]
+    by_number[: len(second)][gap < 0] = 0.0  # on an axis the slope of a depth is no number
+    return torch.cat([gap.clamp(min=0), height]).detach(), by_number
 
 
 def _rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Scene, Float[Tensor, "R 16"]]:
@@ -103,11 +101,6 @@ def _rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Scene, Float[Tenso
     size, centre, rotation = rows[:, None].split([SIZES, 3, 9], -1)
     parts = replace(scene[slots[:, None]], size=size, centre=centre, rotation=rotation.unflatten(-1, (3, 3)))
     return parts, rows
-
-
-def _by_number(rows: Float[Tensor, "R 16"], slopes: Float[Tensor, "R 16 F"]) -> Float[Tensor, "R F"]:
-    product: Tensor = (rows[:, None] @ slopes)[:, 0]
-    return product
 
 
 def _placed(parts: Scene, normalized: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:

@@ -63,10 +63,10 @@ class Misfit:
         systems = [of_target(poses, self.target.pairs(poses.scene, self.generator), self.width) for _ in range(draws)]
         slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))
         if joined and len(self.joints.pairs):
-            gaps = needs(poses.scene, poses.slopes, moved(poses.scene, self.joints))
-            wide = torch.from_numpy(self.together[:, None]) * gaps.slopes
-            slope = slope + (wide.T @ gaps.residual).numpy()
-            curvature = curvature + (wide.T @ gaps.slopes).numpy()
+            residual, slopes = needs(poses, moved(poses.scene, self.joints))
+            wide = torch.from_numpy(self.together[:, None]) * slopes
+            slope = slope + (wide.T @ residual).numpy()
+            curvature = curvature + (wide.T @ slopes).numpy()
         return slope + self.prior * (numbers - self.layout.numbers), curvature + np.diag(self.prior)
 
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:

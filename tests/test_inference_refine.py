@@ -47,7 +47,7 @@ def numbers(program):
 def test_refinement_finds_planted_lengths_and_places():
     planted = parse(PAIR)
     shape = Shape("planted", cells(planted), points(planted).numpy())
-    by_chamfer = refined(planted.snap(), points(planted), steps=80, rate=0.1)
+    by_chamfer = refined(planted.snap(), points(planted))
     for found in (refine(planted.snap(), shape), by_chamfer):
         assert encode(found.flat()).ids.equal(encode(planted.flat()).ids)
         assert (found.blocks, found.size) == (planted.blocks, planted.size)
@@ -58,7 +58,7 @@ def test_refinement_leaves_no_part_thinner_than_fitting_does():
     for text, slot in (("leg(at=(0, 0, 0), size=(1, 9, 9))", 3), ("top_square(at=(0, 0, 0), thickness=9, half=1)", 4)):
         program = parse(text)
         flat = points(program) * torch.tensor([1e-3, 1, 1] if slot == 3 else [1, 1e-3, 1e-3])
-        found = refined(program, flat, steps=60, rate=0.3)
+        found = refined(program, flat)
         assert numbers(found)[0, 0, slot] >= (THINNEST if slot == 3 else THINNEST / 2) - 1e-6
 
 
@@ -67,7 +67,7 @@ def test_refinement_moves_no_number_farther_than_its_reach():
     start = planted.snap()
     fitted = adjust(start, evidence_of_program(planted), reach=0.2)
     assert 0.19 < float((numbers(fitted) - numbers(start)).abs().max()) <= 0.2 + 1e-6
-    by_chamfer = refined(start, points(planted) + 3.0, steps=30, rate=0.3)
+    by_chamfer = refined(start, points(planted) + 3.0)
     assert float((numbers(by_chamfer) - numbers(start)).abs().max()) <= REACH + 1e-6
 
 

@@ -31,6 +31,10 @@ from shapeprog.language.unroll import unroll
 REACH = 1.49
 """Largest change of a parameter from a whole number, in cells: rounding and one step lead back."""
 
+STEPS, DRAWN, RATE = 50, 1000, 0.12
+"""Steps by the chamfer distance, points of target and program that each draws, and its size in cells at first, which
+falls to a tenth by a cosine."""
+
 
 def reconstruct(
     shape: Shape,
@@ -45,17 +49,9 @@ def reconstruct(
 ) -> tuple[Program, Program, str]:
     """The program of at most ``settings.blocks`` blocks whose cells are near those of a shape; the same for one seed.
 
-    Parameters
-    ----------
-    shape, evidence
-        A shape, whose cells are searched, and its surface, to which the numbers are fitted.
-    tied
-        Whether the numbers will be tied: they are then fitted to the faces of the surface, which ties can keep; else by
-        the chamfer distance, which is that of the paper.
-    searching, refining
-        When no further round of the search, and no further step of fitting, starts.
-    progress
-        Called with the name of the current step and the completed share of it.
+    Its numbers are fitted to the faces of the surface, which ties can keep, if they will be ``tied``; else by the
+    chamfer distance, which is that of the paper.  No further round of the search starts after ``searching``, and no
+    further step of fitting after ``refining``.
 
     Returns
     -------
@@ -87,60 +83,35 @@ def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped:
     return 1 - float(iou(occupied(program, unroll(program), snapped), pack(voxels))) + Prices().of(program)
 
 
-def refined(
-    program: Program,
-    target: Float[Tensor, "P 3"],
-    *,
-    steps: int = 50,
-    rate: float = 0.12,
-    seed: int = 0,
-    deadline: Deadline = NEVER,
-) -> Program:
+def refined(program: Program, target: Float[Tensor, "P 3"], *, seed: int = 0, deadline: Deadline = NEVER) -> Program:
     """The same program with continuous parameters, each within ``REACH`` of that of ``program``, by a chamfer distance.
 
-    Of its two directions one is exact: target points to the surface of the union by signed distance; points sampled on
-    the visible surface have their nearest target points.
-
-    Parameters
-    ----------
-    target
-        Points on the surface of the target, in the grid frame, finite; at least one.
-    steps
-        Gradient steps, of 1,000 target points and 1,000 points of the program each.
-    rate
-        First step size of Adam in cells; it falls to a tenth by a cosine.
-    seed
-        Of the points that each step draws.
-    deadline
-        When no further step starts.
+    Of its two directions one is exact: points on the surface of the target (P, 3), at least one, to the surface of the
+    union by signed distance; points sampled on the visible surface have their nearest target points.  The seed is that
+    of the points that each step draws.
     """
-    points = target.double()
     if not program.size:
         return program
-    tunable = Tunable(program)
+    points, tunable = target.double(), Tunable(program)
     values = tunable.values
     low, high = torch.maximum(tunable.low, values - REACH), values + REACH
-    moved = values.clone().requires_grad_()
     mean, square = torch.zeros_like(values), torch.zeros_like(values)
     generator = torch.Generator().manual_seed(seed)
     with one_tensor_thread(kernels=1):
-        for step in range(steps):
-            if deadline.passed(f"the refinement after {step} of {steps} steps"):
+        for step in range(STEPS):
+            if deadline.passed(f"the refinement after {step} of {STEPS} steps"):
                 break
+            moved = values.clone().requires_grad_()
             scene = tunable.scene(moved)
-            if not bool(scene.mask.any()):
-                break
-            some = points[torch.randint(len(points), (1000,), generator=generator)]
-            sample = sample_surface(scene, 1000, generator)
+            some = points[torch.randint(len(points), (DRAWN,), generator=generator)]
+            sample = sample_surface(scene, DRAWN, generator)
             surface_loss = (squared_distance(sample.points, points) * sample.weights).mean()
             loss = (signed_distance(scene, some) ** 2).mean() + surface_loss
-            (slope,) = torch.autograd.grad(loss, moved)
-            slope = slope.nan_to_num(0)
+            slope = torch.autograd.grad(loss, moved)[0].nan_to_num(0)
             # Adam (Kingma & Ba 2015) by hand: the first use of torch.optim imports its compiler, for 1.5 s.
             mean.lerp_(slope, 1 - 0.8)
             square.lerp_(slope**2, 1 - 0.95)
-            pace = rate * (0.55 + 0.45 * math.cos(math.pi * step / steps)) / (1 - 0.8 ** (step + 1))
-            with torch.no_grad():
-                moved.sub_(pace * mean / ((square / (1 - 0.95 ** (step + 1))).sqrt() + 1e-8))
-                moved.copy_(torch.minimum(torch.maximum(moved, low), high))
-    return tunable.settled(moved.detach())
+            pace = RATE * (0.55 + 0.45 * math.cos(math.pi * step / STEPS)) / (1 - 0.8 ** (step + 1))
+            values = values - pace * mean / ((square / (1 - 0.95 ** (step + 1))).sqrt() + 1e-8)
+            values = torch.minimum(torch.maximum(values, low), high)
+    return tunable.settled(values)

@@ -150,23 +150,17 @@ def put(out, n, block, slot, by, slot2, by2):
 @helper
 def moves(block, out):
     """Neighbours of a block: faces, positions, ends, spacings and counts changed by one; their number."""
-    n = 0
-    form = int(block[FORM])
+    n, form = 0, int(block[FORM])
+    last = RADIUS if form == DISC else TILT if form == BACK else TILT - 1
     for delta in (1.0, -1.0):
-        if form != DISC:
-            for axis in range(3):
-                corner, extent = FIRST + axis, EXTENT + axis
-                n = put(out, n, block, corner, delta, corner, 0.0)
-                n = put(out, n, block, extent, delta, extent, 0.0)
-                n = put(out, n, block, corner, delta, extent, -delta)
-                n = put(out, n, block, corner, -delta, extent, 2 * delta)
-            if form == BACK:
-                n = put(out, n, block, TILT, delta, TILT, 0.0)
-                n = put(out, n, block, TILT, delta, FIRST + 1, -delta)
-        else:
-            for slot in range(FIRST, RADIUS + 1):
-                n = put(out, n, block, slot, delta, slot, 0.0)
-            n = put(out, n, block, FIRST, delta, EXTENT, -delta)
+        for slot in range(FIRST, last + 1):
+            n = put(out, n, block, slot, delta, slot, 0.0)
+        for axis in range(1 if form == DISC else 3):
+            corner, extent = FIRST + axis, EXTENT + axis
+            n = put(out, n, block, corner, delta, extent, -delta)
+            n = put(out, n, block, corner, -delta, extent, 2 * delta)
+        if form == BACK:
+            n = put(out, n, block, TILT, delta, FIRST + 1, -delta)
         for level in (COUNT1, COUNT2):
             if block[level] > 1:
                 for axis in range(3):

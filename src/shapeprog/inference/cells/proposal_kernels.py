@@ -24,10 +24,7 @@ SLACK = 0.01
 """Margin below the best at which a bound prunes: more than the rounding error of a sum in single precision."""
 
 SIDE = 32
-"""Largest number of cells along a side of a volume."""
-
-ANY = 1 << 20
-"""A limit above the length of any side: no limit."""
+"""Largest number of cells along a side of a volume: as a limit of the sides of a box it is none."""
 
 
 def families(size: Sequence[int], max_copies: int) -> npt.NDArray[np.int64]:
@@ -128,15 +125,14 @@ def heaviest_box(volume, limit0, limit1, floor, box):
 
     Sides along the first two axes are at most ``limit0`` and ``limit1`` cells.  Only sums above ``floor`` count; the
     floor comes back, and no box is written, when none beats it.  Slabs are accumulated over the first two axes and
-    Kadane's scan runs along the third.  No box weighs more than the positive weights that it holds, so planes, slabs
-    and lines whose positive weights cannot beat the best are skipped.
+    Kadane's scan runs along the third.  No box weighs more than the positive weights that it holds, so planes and
+    lines whose positive weights cannot beat the best are skipped.
     """
     best, weights = floor, volume.reshape(-1)
     size0, size1, size2 = volume.shape
     plane = size1 * size2
-    planes, positive = np.empty(SIDE + 1, np.float32), np.empty(SIDE + 1, np.float32)
-    slab, line = np.empty(SIDE * SIDE, np.float32), np.empty(SIDE, np.float32)
-    planes[size0] = positive[size1] = 0
+    planes, positive = np.zeros(size0 + 1, np.float32), np.zeros(size1 + 1, np.float32)
+    slab, line = np.empty(plane, np.float32), np.empty(size2, np.float32)
     for i in range(size0 - 1, -1, -1):
         planes[i] = planes[i + 1] + positive_sum(weights, i * plane, plane)
     for lo0 in range(size0):
@@ -146,8 +142,6 @@ def heaviest_box(volume, limit0, limit1, floor, box):
             slab[k] = 0
         for hi0 in range(lo0, min(size0, lo0 + limit0)):
             add(slab, weights, hi0 * plane, plane)
-            if planes[lo0] - planes[hi0 + 1] <= best - SLACK:
-                continue
             for j in range(size1 - 1, -1, -1):
                 positive[j] = positive[j + 1] + positive_sum(slab, j * size2, size2)
             for lo1 in range(size1):
@@ -160,8 +154,6 @@ def heaviest_box(volume, limit0, limit1, floor, box):
                     if positive[hi1] == positive[hi1 + 1]:  # nothing positive here: no box ends here
                         continue
                     if positive[lo1] - positive[hi1 + 1] <= best - SLACK:
-                        continue
-                    if positive_sum(line, 0, size2) <= best - SLACK:
                         continue
                     current = np.float32(0)
                     start = 0
@@ -180,7 +172,7 @@ def heaviest_box(volume, limit0, limit1, floor, box):
 @helper
 def search_family(weights, family, floor, block):
     """Write the best repeated box of a row of ``families`` in a volume; its sum, or the floor if none beats it."""
-    volume, limits, box = weights, np.array([ANY, ANY, ANY]), np.zeros(6, np.int64)
+    volume, limits, box = weights, np.array([SIDE, SIDE, SIDE]), np.zeros(6, np.int64)
     for part in range(0, 8, 4):
         axis, kind, a, b = family[part], family[part + 1], family[part + 2], family[part + 3]
         if axis >= 0:
@@ -190,7 +182,7 @@ def search_family(weights, family, floor, block):
     if volume.size == 0:
         return floor
     # The scan along the last axis is the fast one, so the longest goes there; it takes no limit of its length.
-    free, last = np.where(limits == ANY, np.array(volume.shape), 0), 2
+    free, last = np.where(limits == SIDE, np.array(volume.shape), 0), 2
     for axis in range(2):
         if free[axis] > free[last]:
             last = axis

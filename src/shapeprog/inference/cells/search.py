@@ -173,14 +173,11 @@ def polish(blocks: FloatArray, target: Target) -> FloatArray:
             better = improved(blocks[k], draw_all(np.delete(blocks, k, 0)), target)
             settled &= np.array_equal(better, blocks[k])
             blocks[k], settled[k] = better, True
-    k, value = 0, value_of(blocks, target)
-    while k < len(blocks):
+    value = value_of(blocks, target)
+    for k in reversed(range(len(blocks))):
         fewer = np.delete(blocks, k, 0)
-        without = value_of(fewer, target)
-        if without >= value:
+        if (without := value_of(fewer, target)) >= value:
             blocks, value = fewer, without
-        else:
-            k += 1
     return blocks
 
 

@@ -64,7 +64,7 @@ def plain(program: Program) -> list[Draw]:
 def written(text: str, program: Program, target: Program | None = None) -> tuple[Program, set[int]]:
     """The program with calls of the function of a text, against its own surface or that of another program."""
     evidence = evidence_of_program(target or Program(program.body))
-    moved, drawn = with_calls(program, [library(text)], Coverage(evidence))
+    moved, drawn = with_calls(program, library(text), Coverage(evidence))
     return moved, {*drawn}
 
 

@@ -54,18 +54,9 @@ def assemble(
     deadline: Deadline = NEVER,
     progress: Progress | None = None,
 ) -> Assembly:
-    """A program of at most ``blocks`` blocks for a target; the same for the same seed.
+    """A program of at most ``blocks`` blocks for the surface of a mesh or a point cloud; the same for the same seed.
 
-    Parameters
-    ----------
-    coverage
-        The coverage of the surface of a mesh or a point cloud, with the prices of text.
-    blocks
-        Most blocks of the program.
-    seed
-        Of the search among candidates.  Samples of surfaces are the same for all seeds.
-    deadline, progress
-        As for :func:`shapeprog.inference.infer`.
+    The seed is that of the search among candidates.  Samples of surfaces are the same for all seeds.
     """
     evidence, report = coverage.evidence, progress or (lambda step, share: None)
     report("finding structure", 0.1)

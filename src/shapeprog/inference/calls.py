@@ -55,26 +55,12 @@ class Option(NamedTuple):
     block: Block
 
 
-def with_calls(program: Program, libraries: Sequence[Library], coverage: Coverage) -> tuple[Program, frozenset[int]]:
-    """The program with blocks moved to where calls of functions draw them, if it loses little value and nothing floats.
-
-    Parameters
-    ----------
-    program
-        A program in cells.
-    libraries
-        The functions.
-    coverage
-        Coverage of the target, which gives the value.
-
-    Returns
-    -------
-    program, drawn
-        One node for each block, and the indices of those that calls draw.
-    """
+def with_calls(program: Program, library: Library, coverage: Coverage) -> tuple[Program, frozenset[int]]:
+    """A program in cells with blocks moved to where calls of functions draw them, if it loses little value and nothing
+    floats: one node for each block, and the indices of those that calls draw."""
     nodes = list(program.flat().body)
     options = _options(program)
-    patterns = [item for library in libraries for item in library.patterns if item.shortens and item.blocks > 1]
+    patterns = [item for item in library.patterns if item.shortens and item.blocks > 1]
     candidates = [candidate for pattern in patterns for candidate in _candidates(pattern, options)]
     candidates.sort(key=lambda candidate: (-len(candidate.replaced), candidate.difference))
     table = coverage.table([*(Program((node,)) for node in nodes), *(candidate.program for candidate in candidates)])

@@ -182,18 +182,14 @@ def infer(
             tied=statements == "all", seed=seed, searching=searching, refining=refining, progress=progress,
         )  # fmt: skip
     if statements == "all":
-        integral, plain, snapped = snapped, program, None
-        if integral is not None:
-            program = named_anew(program)
-        held: frozenset[int] = frozenset()
+        final, held = program if snapped is None else named_anew(program), frozenset[int]()
         if libraries:
-            program, held = with_calls(program, [joined(libraries)], coverage)
+            final, held = with_calls(final, joined(libraries), coverage)
         if ties:
-            program = tie(program, evidence, floor=floor, held=held, progress=progress)
-        if integral is not None and description_length(plain, target.voxels, integral) < description_length(
-            program, target.voxels
-        ):
-            program, snapped = plain, integral
+            final = tie(final, evidence, floor=floor, held=held, progress=progress)
+        cells = target.voxels
+        if snapped is None or description_length(final, cells) <= description_length(program, cells, snapped):
+            program, snapped = final, None
     if snapped is None:
         program = placed_if_possible(merged(program), floor)
         if libraries:

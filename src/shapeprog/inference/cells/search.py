@@ -74,13 +74,6 @@ def search_structure(
     """Blocks (K, 16) for a solid of cells (32, 32, 32), and why the search stopped.
 
     They are the same for the same seed unless the deadline cuts the search short.
-
-    Parameters
-    ----------
-    deadline
-        When no further round starts.
-    progress
-        Called with the name of the current step and the completed share of it.
     """
     target = Target(voxels, settings)
     starts = [polish(greedy(target, waste, target.table), target) for waste in settings.starts]

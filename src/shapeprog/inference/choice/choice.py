@@ -45,15 +45,13 @@ def choose(
     first = np.searchsorted(index, np.array(start, np.int64))
     searches = [(levels, first[:0])] * SETTINGS.restarts + [((0.0,), first)]
     steps, count = SETTINGS.restarts * len(levels) + 1, len(searches)
-    values, sets = np.full((count, 1), -np.inf), np.full((count, blocks), -1, np.int64)
+    values, sets = np.zeros(count), np.zeros((count, blocks), np.int64)
 
     def run(begin: int, end: int) -> None:
         for number in range(begin, end):
             penalties, selected = searches[number]
             for step, penalty in enumerate(penalties, steps * seed + len(levels) * number):
-                values[number], sets[number] = -np.inf, -1
-                best = values[number], sets[number]
-                search(*data, penalty, rounds // steps, SETTINGS.blink, step, selected, *best)
+                values[number] = search(*data, penalty, rounds // steps, step, selected, sets[number])
                 selected = sets[number][sets[number] >= 0]
 
     over_threads(run, count)

@@ -13,6 +13,9 @@ RUIN_LEAST, RUIN_MOST = 0.1, 0.6
 THRESHOLD = 0.01
 """How much worse than the incumbent a set may be that takes its place; it falls to zero (Dueck and Scheuer 1990)."""
 
+BLINK = 0.05
+"""Probability with which a round overlooks a candidate (Christiaens and Vanden Berghe 2020)."""
+
 
 @helper
 def gain(data, cover, under, selected, count, candidate):
@@ -34,18 +37,18 @@ def gain(data, cover, under, selected, count, candidate):
 
 
 @kernel(
-    "void(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
-    " f8[::1], f8[::1], f8, i8, f8, i8, i8[::1], f8[::1], i8[::1])"
+    "f8(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
+    " f8[::1], f8[::1], f8, i8, i8, i8[::1], i8[::1])"
 )
 def search(
     rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, gains,
-    penalty, rounds, blink, seed, initial_set, best_value, best_set,
+    penalty, rounds, seed, initial_set, best_set,
 ):  # fmt: skip
-    """Ruin and recreate: drop some of the selected, refill greedily, accept a set that is no worse.
+    """The value of the best set by ruin and recreate: drop some of the selected, refill greedily, accept what is no
+    worse.
 
     The greedy step is lazy (Minoux 1978): a gain computed earlier in the round bounds the present one, nearly, as gains
-    rise only where a selected candidate hides samples or fills free space.  With probability ``blink`` it overlooks a
-    candidate (Christiaens and Vanden Berghe 2020).
+    rise only where a selected candidate hides samples or fills free space.
 
     Parameters
     ----------
@@ -53,26 +56,19 @@ def search(
         See ``CoverageTable``.
     gains
         Upper bounds (C,) of the gain of each candidate: what it explains, less the price of its text.
-    words, begins
+    words, begins, inner, starts
         Indices of the weighted words of each candidate that hold bits, one candidate after another, and the first of
-        each.
-    inner, starts
-        The same of each interior.
+        each; the same of each interior.
     penalty
         Price of interior points as a multiple of their weight, whether others explain them or not.
-    rounds, blink, seed
-        Number of rounds; see above; seed of the random numbers.
-    initial_set
-        Initial candidates (S,).
-    best_value, best_set
-        Input and output: the best value (1,) and its candidates (M,), -1 beyond the last, initially those of another
-        search, or minus infinity and -1.
+    initial_set, best_set
+        Initial candidates (S,), and output: the best (M,), -1 beyond the last.
     """
     data = rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, penalty
     most, total, last = min(len(best_set), len(exposed)), len(exposed), len(weights)
     cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
     incumbent, selected = initial_set.copy(), np.empty(most, np.int64)
-    accepted, draws = 0.0, 0
+    accepted, best_value, draws = 0.0, -np.inf, 0
     for turn in range(rounds + 1):
         share = RUIN_LEAST + (RUIN_MOST - RUIN_LEAST) * uniform(seed, draws)
         dropped = int(uniform(seed, draws + 1) * len(incumbent))
@@ -90,8 +86,8 @@ def search(
                     continue
                 best = gain(data, cover, under, selected, count, best_candidate)
             else:
-                if value > best_value[0]:
-                    best_value[0] = value
+                if value > best_value:
+                    best_value = value
                     best_set[:] = -1
                     for k in range(count):  # compiles in half the time of an assignment of slices
                         best_set[k] = selected[k]
@@ -100,7 +96,7 @@ def search(
                 first = int(np.argmax(bound))  # the largest bound first: with its gain, most others are no better
                 for trial in range(-1, total):
                     candidate = first if trial < 0 else trial
-                    if bound[candidate] <= best or (turn > 0 and uniform(seed, draws + candidate) < blink):
+                    if bound[candidate] <= best or (turn > 0 and uniform(seed, draws + candidate) < BLINK):
                         continue
                     bound[candidate] = gain(data, cover, under, selected, count, candidate)
                     if bound[candidate] > best:
@@ -121,3 +117,4 @@ def search(
             count += 1
         if value >= accepted - THRESHOLD * (1.0 - turn / (rounds + 1.0)):
             accepted, incumbent = value, selected[:count].copy()
+    return best_value

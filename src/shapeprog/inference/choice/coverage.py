@@ -101,13 +101,7 @@ class CoverageTable(NamedTuple):
 
 
 class Coverage:
-    """Coverage of one surface by candidates, which are programs of one block; each is computed once.
-
-    Parameters
-    ----------
-    evidence, prices
-        The surface and the prices.
-    """
+    """Coverage of one surface by candidates, which are programs of one block; each is computed once."""
 
     def __init__(self, evidence: Evidence, prices: Prices | None = None) -> None:
         self.evidence, self.prices = evidence, prices or Prices()
@@ -137,15 +131,15 @@ class Coverage:
             self._rows = list(map(np.concatenate, zip(self._rows, rows, strict=True))) if self._rows else rows
             self._index |= {program: index for index, program in enumerate(new, len(self._index))}
         selected = np.array([self._index[candidate] for candidate in candidates], np.int64)
-        covered, interior, samples, sampled, sample_price, price = (row[selected] for row in self._rows)
+        covered, interior, samples, sample_price, price = (row[selected] for row in self._rows)
         _, hidden = covers(scene, sorted_by_cell(samples.reshape(-1, 3)), 0.0)
-        exposed = np.array([2**number - 1 for number in sampled.tolist()], np.uint64) & ~hidden.diagonal()
+        exposed = pack(samples[..., 0] != AWAY)[:, 0] & ~hidden.diagonal()
         bits, words = np.concatenate([covered, hidden], 1), -(-len(self.evidence.points) // WORD)
         return CoverageTable(bits, self._weights, words, interior, exposed, sample_price, price)
 
     def _rows_of(self, candidates: Sequence[Program], scene: Scene) -> list[Array]:
-        """Arrays with a row for each candidate: bits covered, bits of the interior, unsupported samples, their number,
-        the price of each, and that of the text."""
+        """Arrays with a row for each candidate: bits covered, bits of the interior, unsupported samples (B, 64, 3), the
+        price of each, and that of the text."""
         evidence, prices = self.evidence, self.prices
         tied = centred(scene, candidates) + square(scene)
         price = np.array([prices.of(program) for program in candidates]) - prices.number * tied
@@ -162,7 +156,7 @@ class Coverage:
         index = np.cumsum(number)[:, None] - number + slot * number // np.maximum(sampled, 1)
         samples = np.vstack([points, np.full((1, 3), AWAY)])[np.where(slot < sampled, index, -1)]
         cost = np.bincount(owners, areas, len(candidates)) / np.maximum(sampled[:, 0], 1)
-        return [covered, interior, samples, sampled[:, 0], prices.unsupported / evidence.area * cost, price]
+        return [covered, interior, samples, prices.unsupported / evidence.area * cost, price]
 
 
 def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64]:

@@ -12,7 +12,6 @@ class Settings:
     rounds: int = 1000  # rounds of ruin and recreate of all searches together
     restarts: int = 4  # independent searches, of which the best set counts
     earlier: float = 1e-4  # price of the last candidate above that of the first: all seeds prefer the same
-    blink: float = 0.05  # probability with which a round overlooks a candidate
     interior: tuple[float, ...] = (8.0, 1.0)  # initial penalties of points in interiors, in weights
 
     # Connecting

@@ -53,16 +53,8 @@ def adjust(
 ) -> Program:
     """The same program with numbers that fit the evidence, tidy: hundredths of cells, tenths of degrees.
 
-    Parameters
-    ----------
-    steps
-        Steps of Gauss and Newton; in the last ``FIT.last`` of them angles are fixed.
-    reach
-        Largest change of a number.
-    seed
-        Of the samples that each step draws.
-    deadline
-        When no further step starts.
+    No number changes by more than ``reach``.  In the last ``FIT.last`` steps of Gauss and Newton angles are fixed.  The
+    seed is that of the samples that each step draws.
     """
     if not program.size:
         return program

@@ -67,7 +67,6 @@ class Parts:
         self.level: Mask = self.slender & (self.rise <= 0.35)
         self.board: Mask = (self.thin <= 0.3 * self.middle) & ~bent
         self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
-        self.facing_side: Mask = self.board & ~self.slender & (self.side == self.thin)
         self.small: Mask = self.long <= 0.12 * self.size.max()
         self.tiny: Mask = self.up * self.side <= 0.012 * self.size[UP] * self.size[SIDE]  # seen from the front
         self.tiny &= self.depth <= self.size[DEPTH] / 4
@@ -132,16 +131,15 @@ class Parts:
         plate = self.wide & self.flat & (self.bottom <= self.floor + 0.2 * self.size[UP])
         self.lowest: Mask = plate & (self.bottom <= self.bottom[plate].min(initial=np.inf) + self.near)
         # Walls and fronts are boards by the way that they face, and slender ones that are wide or high in the whole.
-        standing = self.board & self.upright
-        deep = (self.side == self.thin) & (self.depth >= self.size[DEPTH] / 2)
-        wide = (self.depth == self.thin) & (self.side >= self.size[SIDE] / 2)
-        self.wall: Mask = self.facing_side | (standing & deep)
+        deep = ~self.slender | (self.upright & (self.depth >= self.size[DEPTH] / 2))
+        self.wall: Mask = self.board & (self.side == self.thin) & deep
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
         # Of the whole: its sides reach the floor; it has sides, or a body.
         self.walled = (sides & self.grounded).sum() > 1
         self.cased = np.bool_(sides.sum() > 1 or self.bulky.any())
+        wide = ~self.slender | (self.upright & (self.side >= self.size[SIDE] / 2))
         large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
-        self.front: Mask = self.facing_front | (self.board & (self.depth == self.thin) & large) | (standing & wide)
+        self.front: Mask = self.board & (self.depth == self.thin) & (wide | large)
         highest = np.where(self.in_front, 0.2, 0.3) * self.size[UP]
         self.plinth: Mask = self.front & self.grounded & (self.up <= highest) & (self.rear < 0)
 

@@ -7,6 +7,7 @@ import numpy as np
 from shapeprog.inference.cells.block_kernels import BACK, BOX, COUNT1, COUNT2, DISC, EXTENT, FIRST, FORM, TILT
 from shapeprog.inference.roles.roles import roles_of_blocks
 from shapeprog.language.program import Draw, Loop, Node, Program, nest
+from shapeprog.language.statement import language
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
 FORMS = {BOX: "locker", BACK: "back", DISC: "support_cylinder"}
@@ -32,16 +33,10 @@ CENTRED = {
 }  # fmt: skip
 """What draws the same as a statement given by its middle, which is on the grid for even numbers of cells alone."""
 
-SQUARES = {"top_square", "base_square", "support_cuboid"}
-"""Those that are as wide as deep."""
-
 
 def to_program(blocks: FloatArray) -> Program:
     """The program of blocks (K, 16), largest part first, every part named by its role."""
-    if not len(blocks):
-        return Program()
-    tidied = np.stack([tidy(block) for block in blocks])
-    tidied = tidied[np.argsort([-_cells(block) for block in tidied], kind="stable")]
+    tidied = sorted(map(tidy, blocks), key=_cells, reverse=True)
     roles = roles_of_blocks(Program(tuple(map(_node, tidied))))
     return Program(tuple(map(_node, tidied, roles)))
 
@@ -78,21 +73,18 @@ def _cells(block: FloatArray) -> float:
 
 def _node(block: FloatArray, role: str = "") -> Node:
     """The statement of the paper that draws a block with a role, and its loops."""
-    form, numbers = int(block[FORM]), block[FIRST:COUNT1].tolist()
+    form, numbers = int(block[FORM]), block[FIRST:COUNT1].copy()
     name = {BOX: BOXES, DISC: DISCS}.get(form, {}).get(role, FORMS[form])
-    if form == DISC:
-        numbers = numbers[:5]
-    if form == BOX:
-        at, size = block[FIRST:EXTENT].copy(), block[EXTENT:TILT].copy()
-        while name in CENTRED:
-            axes = [DEPTH] if name == "sideboard" else [DEPTH, SIDE]
-            if (size[axes] % 2 == 0).all() and (size[DEPTH] == size[SIDE] or name not in SQUARES):
-                size[axes] /= 2
-                at[axes] += size[axes]
-                break
-            name = CENTRED[name]
-        numbers = [*at.tolist(), *size.tolist()][: 5 if name in SQUARES else 6] + [0.0] * (name == "back")
+    at, size = np.split(numbers, [3, 6])[:2]
+    while name in CENTRED:
+        axes = [DEPTH] if name == "sideboard" else [DEPTH, SIDE]
+        is_square = language()[name].size == 5  # one number for width and depth
+        if (size[axes] % 2 == 0).all() and (size[DEPTH] == size[SIDE] or not is_square):
+            size[axes] /= 2
+            at[axes] += size[axes]
+            break
+        name = CENTRED[name]
     loops = (
         Loop("translate", tuple(block[loop : loop + 4].tolist()), ()) for loop in (COUNT1, COUNT2) if block[loop] > 1
     )
-    return nest((*loops, Draw(name, tuple(numbers))))
+    return nest((*loops, Draw(name, tuple(numbers[: language()[name].size].tolist()))))

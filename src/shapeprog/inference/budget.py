@@ -19,18 +19,10 @@ BUDGET = 60.0
 
 @dataclass
 class Deadline:
-    """A moment after which no further step starts.
+    """A moment after which no further step starts."""
 
-    Parameters
-    ----------
-    at
-        Value of ``time.monotonic()``; never by default.
-    cut
-        The step that it cut short, and the progress of that step; empty if none was.
-    """
-
-    at: float = float("inf")
-    cut: str = ""
+    at: float = float("inf")  # value of ``time.monotonic()``; never by default
+    cut: str = ""  # the step that it cut short, and the progress of that step; empty if none was
 
     def passed(self, work: str) -> bool:
         """Whether it is too late for the next step; ``work`` names that step and its progress."""

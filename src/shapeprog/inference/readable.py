@@ -32,13 +32,10 @@ CELLS = "cells"
 
 
 def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | None:
-    """The unit in which a program that was inferred from a shape is written.
+    """The unit in which a program that was inferred from a shape is written, by its name, or ``cells``.
 
-    Parameters
-    ----------
-    name
-        Name of the unit, or ``cells``; empty for that of the file, which may have no name.  Voxels are then left in
-        cells unless somebody has named the unit of the file.  Statements in cells have no unit.
+    Without a name it is that of the file, which may have none.  Voxels are then left in cells unless somebody has named
+    the unit of the file.  Statements in cells have no unit.
     """
     plain_voxels = shape.kind == "voxels" and not (name or shape.unit)
     if name == CELLS or plain_voxels or program.scale is None:

@@ -178,14 +178,9 @@ def moves(block, out):
 
 @kernel("void(f8[::1], u8[::1], u8[::1], f8)")
 def descend(block, occupied, covered, price):
-    """Best-improvement descent of one block, in place.
+    """Best-improvement descent of one block, in place, on IoU less the price of its statements.
 
-    Parameters
-    ----------
-    occupied, covered
-        The solid, and the cells of the other blocks, as words (512).
-    price
-        Price of a statement in IoU.
+    ``occupied`` are the cells of the solid, ``covered`` those of the other blocks, as words (512).
     """
     words, around = np.empty(WORDS, np.uint64), np.empty((MOST_MOVES, WIDTH))
     best = -np.inf

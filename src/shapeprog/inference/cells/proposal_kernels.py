@@ -31,15 +31,8 @@ def families(size: Sequence[int], max_copies: int) -> npt.NDArray[np.int64]:
     """Rows (axis1, kind1, a1, b1, axis2, kind2, a2, b2) of ways to repeat a box in a volume of this size.
 
     Kind ``MIRROR`` pairs a box with its image in plane a (see ``mirrors``), ``PERIOD`` repeats it a times at distance
-    b; an axis of -1 means no repetition.  The first row is the single box.  A second loop is a mirrored pair about the
-    middle.
-
-    Parameters
-    ----------
-    size
-        Cells along each axis.
-    max_copies
-        Largest number of copies in an even row.
+    b, at most ``max_copies`` times; an axis of -1 means no repetition.  The first row is the single box.  A second loop
+    is a mirrored pair about the middle.
     """
     single: list[tuple[int, int, int, int]] = []
     for axis, length in enumerate(size):
@@ -138,8 +131,7 @@ def heaviest_box(volume, limit0, limit1, floor, box):
     for lo0 in range(size0):
         if planes[lo0] <= best - SLACK:
             break
-        for k in range(plane):
-            slab[k] = 0
+        slab[:] = 0
         for hi0 in range(lo0, min(size0, lo0 + limit0)):
             add(slab, weights, hi0 * plane, plane)
             for j in range(size1 - 1, -1, -1):
@@ -147,8 +139,7 @@ def heaviest_box(volume, limit0, limit1, floor, box):
             for lo1 in range(size1):
                 if positive[lo1] <= best - SLACK:
                     break
-                for k in range(size2):
-                    line[k] = 0
+                line[:] = 0
                 for hi1 in range(lo1, min(size1, lo1 + limit1)):
                     add(line, slab, hi1 * size2, size2)
                     if positive[hi1] == positive[hi1 + 1]:  # nothing positive here: no box ends here
@@ -211,18 +202,10 @@ def search_family(weights, family, floor, block):
 
 @kernel("f8(f4[:, :, ::1], i8[:, ::1], f8, f8[::1])")
 def propose(weights, table, price, block):
-    """Write the repeated box with the largest gain of weight; its gain, zero when no box gains.
+    """Write the repeated box with the largest gain of weight as a block (16); its gain, zero when no box gains.
 
-    Parameters
-    ----------
-    weights
-        Weights of the cells of a volume (A, B, C), which contains every proposal.
-    table
-        Rows of ``families``: those to try.
-    price
-        Weight that one statement has to gain.
-    block
-        Output (16), in the frame of the volume.
+    The box and its copies are in a volume of weights (A, B, C), in whose frame it is.  The table has the rows of
+    ``families`` to try, and every statement has to gain its price.
     """
     best = 0.0
     for family in table:

@@ -37,30 +37,18 @@ from shapeprog.space import HALF, Array, FloatArray
 
 
 class Target:
-    """Target and objective of a search.
-
-    Attributes
-    ----------
-    cells
-        The solid as words (512).
-    low, inside
-        Low corner of the box around it, in the grid frame, and the solid in that box (A, B, C).
-    box
-        The slices of the grid that are the box.
-    table
-        The ways of repeating a box: rows of ``families``.
-    settings, statement
-        Limits and prices, and the price of a statement in cells.
-    """
+    """Target and objective of a search."""
 
     def __init__(self, voxels: npt.NDArray[np.bool_], settings: Settings) -> None:
+        self.settings = settings
+        self.cells: Words = np.packbits(voxels, bitorder="little").view(np.uint64)  # the solid as words (512)
         occupied = np.argwhere(voxels)
+        self.statement = settings.price * len(occupied)  # the price of a statement in cells
         low, high = occupied.min(0), occupied.max(0) + 1
+        # The low corner of the box around the solid, in the grid frame, its slices of the grid, and the solid in it.
         self.low, self.box = low - HALF, tuple(map(slice, low, high))
-        self.cells: Words = np.packbits(voxels, bitorder="little").view(np.uint64)
         self.inside = voxels[self.box]
-        self.table = families(self.inside.shape, settings.copies)
-        self.settings, self.statement = settings, settings.price * len(occupied)
+        self.table = families(self.inside.shape, settings.copies)  # the ways of repeating a box
 
 
 def search_structure(
@@ -177,12 +165,7 @@ def polish(blocks: FloatArray, target: Target) -> FloatArray:
 def best_box(covered: Words, waste: float, table: Array, target: Target) -> tuple[float, FloatArray]:
     """The repeated box with the largest gain on uncovered cells, after its gain in cells; that is zero if none gains.
 
-    Parameters
-    ----------
-    waste
-        Weight of an empty cell against an occupied one.
-    table
-        The ways of repeating a box to try.
+    An empty cell weighs ``waste``, an occupied one 1.
     """
     block, done = np.zeros(WIDTH), cells_of(covered)[target.box]
     weights = np.where(done, 0, np.where(target.inside, 1, -waste)).astype(np.float32)

@@ -46,33 +46,19 @@ AWAY = 4.0 * HALF
 class Prices:
     """Prices subtracted from the value of a program, in shares of the target explained; chosen on val.
 
-    Parameters
-    ----------
-    unsupported
-        Of exposed surface that the target does not support, over the area of the target.
-    free
-        Of free space filled, in cells, over the same area.
-    statement, loop, number
-        Of a drawing statement or call, of a loop, and of every continuous number in the text.  Each further block of a
-        call costs as much as a loop; otherwise a box could be written as a drawer whose handle is hidden.
-    part
-        Added for every part of a mesh that one primitive draws, 16 times at most: the gaps between drawers have
-        little surface.
-    outside
-        Of a candidate that reaches beyond the box around the target, such as a last copy that is too many.
-    close
-        Added for the share of the target that lies within half a tolerance, with nearly the same normal: among
-        statements that explain the same, the one with the shape of the target wins, a square leg before a round one.
+    Each further block of a call costs as much as a loop; otherwise a box could be written as a drawer whose handle is
+    hidden.  Parts are worth something of their own, as the gaps between drawers have little surface.  So is closeness:
+    among statements that explain the same, the one with the shape of the target wins, a square leg before a round one.
     """
 
-    unsupported: float = 0.4
-    free: float = 0.5
-    statement: float = 0.005
+    unsupported: float = 0.4  # of exposed surface that the target does not support, over the area of the target
+    free: float = 0.5  # of free space filled, in cells, over the same area
+    statement: float = 0.005  # of a drawing statement or call
     loop: float = 0.002
-    number: float = 0.0005
-    part: float = 0.003
-    outside: float = 0.02
-    close: float = 0.015
+    number: float = 0.0005  # of every continuous number in the text
+    part: float = 0.003  # added for every part of a mesh that one primitive draws, 16 times at most
+    outside: float = 0.02  # of reaching beyond the box around the target, such as a last copy that is too many
+    close: float = 0.015  # added for the share of the target within half a tolerance, with nearly the same normal
 
     def of(self, program: Program) -> float:
         """The price of the text of a program; function definitions cost nothing."""

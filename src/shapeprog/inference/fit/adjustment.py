@@ -87,8 +87,6 @@ def adjust(
 
 def tidy(program: Program) -> Program:
     """The same program in hundredths of cells and tenths of degrees."""
-    if not program.size:
-        return program
     tunable = Tunable(program)
     return tunable.settled(tunable.values)
 

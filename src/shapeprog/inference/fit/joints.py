@@ -24,24 +24,12 @@ from shapeprog.inference.fit.tunable import Poses
 
 
 class Joints(NamedTuple):
-    """Pairs of primitives that should touch, and primitives that should touch the floor.
-
-    Parameters
-    ----------
-    pairs
-        Slots (C, 2) of the two.
-    normalized
-        Point of each joint (C, 3) in the box of the first primitive, in units of its half extents.
-    standing
-        Slots (S,) of the primitives that should touch the floor.
-    floor
-        Height of the floor.
-    """
+    """Pairs of primitives that should touch, and primitives that should touch the floor, by their slots."""
 
     pairs: Int[Tensor, "C 2"]
-    normalized: Float[Tensor, "C 3"]
+    normalized: Float[Tensor, "C 3"]  # point of each joint in the box of the first, in units of its half extents
     standing: Int[Tensor, " S"]
-    floor: float
+    floor: float  # its height
 
 
 def find_joints(scene: Scene, floor: float) -> Joints:

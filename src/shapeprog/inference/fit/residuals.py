@@ -31,31 +31,20 @@ NEVER = 1e9
 
 
 class Pairs(NamedTuple):
-    """Points of the target (R, 3) with their partners on the surface of the program.
+    """Points of the target with their partners, which are samples of the surface of the program.
 
-    Parameters
-    ----------
-    points, samples, normals, slots
-        The points, the samples and their outward normals (R, 3), and the primitives (R,) that the samples lie on.
-    offset
-        Squared penalty of the pair (R,) besides the distance along the normal: the distance of the two along the
-        surface, beyond the spacing of samples, and the difference of their normals.
-    weights
-        Weights of the pairs (R,).
-    either
-        Whether the normals are parallel and it is not known on which side of its surface the point lies (R,).
-    anywhere
-        Whether the pair refers to the nearest point of the primitive (R,), whatever its normal.
+    Besides the distance along the normal, a pair is penalised for that along the surface, beyond the spacing of
+    samples, and for the difference of the normals.
     """
 
     points: Float[Tensor, "R 3"]
     samples: Float[Tensor, "R 3"]
-    normals: Float[Tensor, "R 3"]
-    slots: Int[Tensor, " R"]
-    offset: Float[Tensor, " R"]
+    normals: Float[Tensor, "R 3"]  # outward ones of the samples
+    slots: Int[Tensor, " R"]  # the primitives that the samples lie on
+    offset: Float[Tensor, " R"]  # squared penalty besides the distance along the normal
     weights: Float[Tensor, " R"]
-    either: Bool[Tensor, " R"]
-    anywhere: Bool[Tensor, " R"]
+    either: Bool[Tensor, " R"]  # the normals are parallel; on which side of its surface the point lies is not known
+    anywhere: Bool[Tensor, " R"]  # the pair refers to the nearest point of the primitive, whatever its normal
 
 
 System = tuple[Float[Tensor, " F"], Float[Tensor, "F F"]]

@@ -46,18 +46,6 @@ class Tunable:
     Counts, turns and axes stay, and so do steps of a full turn and exact zeros of a shift or of the plane of a mirror:
     the loop along an axis keeps to it, the symmetric object stays symmetric.  A loop around several statements has its
     numbers once.
-
-    Attributes
-    ----------
-    values, kinds
-        Where the numbers are at the start (F,), and of which kind each is.
-    low
-        Lower bounds (F,): a thickness of ``THINNEST`` for lengths.
-    moving
-        For every number (F) the index of its node in the order of the text, and its slot there.
-    scale
-        How many cells the surface moves for one unit of each (F,), at most: 1 for places and lengths, more for shifts
-        of many copies, a lever for angles.
     """
 
     def __init__(self, program: Program) -> None:
@@ -65,6 +53,7 @@ class Tunable:
         nodes = list(program.walk())
         code = encode(program, dtype=torch.float64)
         self._start = code.parameters
+        # Of every number (F) the index of its node in the order of the text, and its slot there.
         self.moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
         # The same program with the number of every value, from 1, in its place; 0 where it stays.
         place = {key: float(f) for f, key in enumerate(self.moving, 1)}
@@ -111,6 +100,8 @@ class Tunable:
         return torch.where(self._index >= 0, padded[..., self._index], self._start)
 
     def _scales(self, nodes: Sequence[Node], scene: Scene) -> Float[Tensor, " F"]:
+        """How many cells the surface moves for one unit of each number, at most: 1 for places and lengths, more for
+        shifts of many copies, a lever for angles."""
         reach = scene.bounds.norm(dim=-1)
         scale = torch.ones(len(self.moving), dtype=torch.float64)
         for f, (n, _) in enumerate(self.moving):

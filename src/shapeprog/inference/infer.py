@@ -93,8 +93,7 @@ class Result:
 
     def _repr_png_(self) -> bytes:
         """A picture of the program, which notebooks show."""
-        picture: bytes = importlib.import_module("shapeprog.view.page").png(self.program, self.scores)
-        return picture
+        return importlib.import_module("shapeprog.view.page").png(self.program, self.scores)
 
 
 @one_tensor_thread()

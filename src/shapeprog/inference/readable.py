@@ -47,12 +47,8 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     """The program with its lengths in a unit, or in cells, rounded as a person would.
 
     No number and no face moves by more than .015 cells; where parts would come apart, by less.  A program of
-    more than 256 primitives is not rounded, and one in this unit is returned unchanged.
-
-    Raises
-    ------
-    ShapeProgError
-        As for :func:`~shapeprog.language.dimensions.in_unit`.
+    more than 256 primitives is not rounded, and one in this unit is returned unchanged.  What ``in_unit`` refuses is
+    refused.
     """
     if program.unit == unit:
         return program

@@ -53,13 +53,8 @@ def reconstruct(
     chamfer distance, which is that of the paper.  No further round of the search starts after ``searching``, and no
     further step of fitting after ``refining``.
 
-    Returns
-    -------
-    program, snapped
-        In the statements of the paper: with continuous numbers, and with whole ones, each within one of the rounded
-        number of ``program``.
-    reason
-        Why the search stopped, as a sentence.
+    There are two of it, in the statements of the paper: with continuous numbers, and with whole ones, each within one
+    of the rounded number of the first.  With them comes a sentence that says why the search stopped.
     """
     blocks, stopped = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
     snapped = to_program(blocks)

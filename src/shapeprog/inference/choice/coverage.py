@@ -181,8 +181,7 @@ def protrusion(scene: Scene, evidence: Evidence) -> FloatArray:
     centre, reach = scene.centre.numpy(), (scene.rotation.abs() * scene.bounds[..., None, :]).amax(-1).numpy()
     low, high = evidence.surface.min(0), evidence.surface.max(0)
     beyond = np.maximum(low - (centre - reach), centre + reach - high).max(2)
-    result: FloatArray = np.where(scene.mask, beyond, 0.0).max(1, initial=0.0)
-    return result
+    return np.where(scene.mask, beyond, 0.0).max(1, initial=0.0)
 
 
 def parts_drawn(scene: Scene, evidence: Evidence) -> npt.NDArray[np.bool_]:

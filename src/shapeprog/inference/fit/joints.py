@@ -94,8 +94,7 @@ def _rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Scene, Float[Tenso
 def _placed(parts: Scene, normalized: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
     """Points given in the boxes of the first of primitives (C, k), in units of the half extents."""
     local = (parts.bounds[:, 0] * normalized)[..., None]
-    points: Tensor = parts.centre[:, 0] + (parts.rotation[:, 0] @ local)[..., 0]
-    return points
+    return parts.centre[:, 0] + (parts.rotation[:, 0] @ local)[..., 0]
 
 
 def _inner(scene: Scene, points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:

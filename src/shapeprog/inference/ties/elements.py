@@ -8,17 +8,15 @@ from an anchor, the low side, the middle or the high side of the whole, see :mod
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import OrientedBoxes
 from shapeprog.language.ast import Group, Keywords, Part, Point
 from shapeprog.language.expression import value_at
-from shapeprog.language.placement import AXES, POINTS, SIZES, coordinate_of, interval_of
+from shapeprog.language.placement import AXES, SIZES, coordinate_of, interval_of
 
 LOW, MIDDLE, HIGH = 0, 1, 2  # anchors
-ALIGNED = 1e-5  # cells by which coordinates may differ that are the same
 
 Anchors = tuple[int, ...]
 """The anchors of both ends of an interval, or of a single coordinate."""
@@ -29,39 +27,16 @@ Key = tuple[int, str, int]
 """Line, key and axis of an element."""
 
 Kind = Literal["extent", "clearance", "offset", "size", "radius", "edge", "gap", "angle", "length"]
-
-KINDS: dict[str, Kind] = {
-    "radius": "radius", "edge": "edge", "gap": "gap", "lean": "length",
-    "tilt": "angle", "turn": "angle", "step": "angle",
-}  # fmt: skip
-"""What keywords measure that are not measured from a side."""
+"""What a number measures."""
 
 
-@dataclass(frozen=True)
-class Element:
-    """The coordinates of a line along one axis.
+class Element(NamedTuple):
+    """The coordinates of a line along one axis, from the low side of the whole, in the unit of the text."""
 
-    Parameters
-    ----------
-    line
-        Number of the line, in the order of the text.
-    key
-        Empty for the box of a part or a division; else ``start``, ``through``, ``end``, ``across`` (the size of a bar),
-        ``plane``, ``centre`` or ``last``.
-    axis
-        0 left-right, 1 front-rear, 2 vertical.
-    kind
-        Whether it is an interval, the axis of a round part, or a single coordinate.
-    low, high
-        Ends from the low side of the whole, in the unit of the text; the same for a single coordinate.
-    anchors
-        From where they are measured.
-    """
-
-    line: int
-    key: str
-    axis: int
-    kind: ElementKind
+    line: int  # its number, in the order of the text
+    key: str  # empty for a box; else ``across`` for the size of a bar, a point, ``plane``, ``centre`` or ``last``
+    axis: int  # 0 left-right, 1 front-rear, 2 vertical
+    kind: ElementKind  # a box, the axis of a round part, or a single coordinate
     low: float
     high: float
     anchors: Anchors
@@ -72,47 +47,27 @@ class Element:
         return (self.low + self.high) / 2
 
 
-@dataclass(frozen=True)
-class Slot:
-    """One number of the text.
+class Slot(NamedTuple):
+    """One number of the text."""
 
-    Parameters
-    ----------
-    line, word
-        Number of the line, and keyword; that of a point begins with ``start.`` or such.
-    kind, axis
-        The quantity that it measures, along an axis 0, 1 or 2, else -1.
-    value
-        Its value, in the unit of the text, or in degrees.
-    """
-
-    line: int
-    word: str
+    line: int  # the number of its line
+    word: str  # its keyword; that of a point begins with ``start.`` or such
     kind: Kind
-    axis: int
-    value: float
+    axis: int  # 0, 1 or 2, else -1
+    value: float  # in the unit of the text, or in degrees
 
 
 def ends_of(
     line: Part | Group, key: str, axis: int, numbers: Mapping[str, float], forms: Mapping[str, Any] | None = None
 ) -> tuple[Any, Any]:
-    """The low and high coordinate of an element from the low side of the whole.
+    """The low and high coordinate of an element, see :class:`Element`, from the low side of the whole.
 
-    Parameters
-    ----------
-    line, key, axis
-        As of :class:`Element`.
-    numbers
-        The values of all names.
-    forms
-        What names stand for in the result, such as linear forms; by default their values.
+    ``numbers`` are the values of all names, and ``forms`` what they stand for in the result, such as linear forms; by
+    default their values.
     """
     keywords, values = dict(line.keywords), numbers if forms is None else forms
-    pairs: Keywords = line.keywords
-    if key in (*POINTS, "last"):
-        argument = keywords[key]
-        assert isinstance(argument, Point)
-        pairs = argument.keywords
+    point = keywords.get(key)
+    pairs: Keywords = point.keywords if isinstance(point, Point) else line.keywords
     given = {word: value_at(value, values) for word, value in pairs if word in AXES[axis]}  # type: ignore[arg-type]
     sides = 0.0, values[SIZES[axis]]
     if key in ("", "across"):

@@ -11,27 +11,22 @@ from torch import Tensor
 
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.tunable import Poses, Tunable
-from shapeprog.inference.ties.elements import (
-    ALIGNED,
-    HIGH,
-    KINDS,
-    LOW,
-    MIDDLE,
-    Anchors,
-    Element,
-    ElementKind,
-    Key,
-    Kind,
-    Slot,
-    ends_of,
-)
+from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, ElementKind, Key, Kind, Slot, ends_of
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
+from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Binary, Name, Value
 from shapeprog.language.placement import AXES, BOX, POINTS, ROUND, SIZES, axis_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
+
+ALIGNED = 1e-5  # cells by which coordinates may differ that are the same
+
+KINDS: dict[str, Kind] = {
+    "radius": "radius", "edge": "edge", "gap": "gap", "lean": "length",
+    "tilt": "angle", "turn": "angle", "step": "angle",
+}  # fmt: skip
+"""What keywords measure that are not measured from a side."""
 
 
 class Layout:
@@ -45,29 +40,6 @@ class Layout:
         The anchors of all elements; by default the low side.
     divide
         Whether neighbours become divisions of a box, and outer mirrors about the middle are around one line each.
-
-    Attributes
-    ----------
-    extents
-        Width, depth and height of the whole.
-    lines, words, parts
-        Its parts and loops, in the order of the text, their roles, or else kinds, and the numbers of those that are
-        parts; upright round parts have a radius. A division stands for its part, with its role.
-    loops_around
-        For every line the numbers of the loops around it.
-    filling
-        The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
-    elements
-        All elements, by line, key and axis.
-    slots, names, index
-        The numbers (P,), the three sizes of the whole first, their names, and that of every line and keyword.
-    body, source
-        The parts and loops with names, and the program of these.
-    numbers
-        Where the numbers are at the start (P,).
-    tunable, jacobian, low
-        Its statements in cells; how their numbers follow from those of the text (F, P), up to constants; and lower
-        bounds (F,) of the products of both: no part may become thinner than ``THINNEST``.
     """
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None, *, divide: bool = True) -> None:
@@ -81,31 +53,39 @@ class Layout:
                 case Part() | Group():
                     drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
+        # The parts and loops, in the order of the text, and the roles or else kinds of their parts.  A division stands
+        # for its part, with its role.
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
-        parts = [(index, line) for index, line in enumerate(self.lines) if isinstance(line, Part)]
         self.words = [line.kind for line in self.lines]
-        for index, part in parts:
-            self.words[index] = self.words[index - self._divided(index)] = part.role or part.kind
-        self.parts = [index - self._divided(index) for index, _ in parts]
-        self.filling = {index for index in self.parts if self._fills(self.lines[index])}
-        if self.filling:
-            self._sizes["depth"] = self._sizes["width"]
-        self.extents = tuple(float(self._sizes[size]) for size in SIZES)
+        self.parts: list[int] = []  # the numbers of the lines that are parts
+        for index, line in enumerate(self.lines):
+            if isinstance(line, Part):
+                self.parts.append(index - self._divided(index))
+                self.words[index] = self.words[self.parts[-1]] = line.role or line.kind
         last = [index + sum(1 for _ in Source((line,)).walk()) - 1 for index, line in enumerate(self.lines)]
         self.loops_around = [[loop for loop in range(n) if n <= last[loop]] for n in range(len(self.lines))]
+        # The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
+        self._filling = [
+            index for index, line in enumerate(self.lines)
+            if line.kind == "cylinder" and "radius" not in dict(line.keywords)
+        ]  # fmt: skip
+        if self._filling:
+            self._sizes["depth"] = self._sizes["width"]
+        self.extents = tuple(float(self._sizes[size]) for size in SIZES)
         self.elements: dict[Key, Element] = {}
         self._anchors = anchors or {}
+        # The numbers (P,), the three sizes of the whole first, their names, and that of every line and keyword.
         self.slots = [Slot(-1, word, "extent", axis, self.extents[axis]) for axis, word in enumerate(SIZES)]
-        self.index: dict[tuple[int, str], int] = {}
         self.names = [*SIZES]
+        self.index: dict[tuple[int, str], int] = {}
         self._named: list[Part | Group] = []
         self.body = changed_lines(tree, self._with_names)
         # What each name is (P + 1,) where one of all numbers is 1 and the others are 0, and where all are 0: a linear
         # function of the numbers is given by these values of it.
         self._forms = dict(zip(self.names, np.eye(len(self.names) + 1), strict=False))
         self._numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
+        self.numbers: FloatArray = np.array([slot.value for slot in self.slots])  # at the start (P,)
         self.source = Source((Assignment(tuple(self._numbers.items())), *self.body), source.unit, source.scale)
-        self.numbers: FloatArray = np.array([slot.value for slot in self.slots])
         self.tunable, scale = Tunable(Program(expanded(self.source))), source.scale
         assert scale is not None
         floor = scale.floor + (self.extents[2] - self._forms["height"]) * 0.5  # the middle of the whole stays
@@ -113,6 +93,8 @@ class Layout:
         values = np.zeros((len(self.tunable.moving), len(self.slots) + 1))
         for value, (n, slot) in zip(values, self.tunable.moving, strict=True):
             value += nodes[n].values[slot]
+        # How the numbers of its statements in cells follow from those of the text (F, P), up to constants, and lower
+        # bounds (F,) of the products of both: no part may become thinner than ``THINNEST``.
         self.jacobian: FloatArray = values[:, :-1] - values[:, -1:]
         self._offset = values[:, -1]
         self.low: FloatArray = self.tunable.low.numpy() - self._offset
@@ -137,10 +119,10 @@ class Layout:
 
     def fixed(self) -> FloatArray:
         """Relations (M, P) that always hold: the width and the depth of a round part that fills the whole are equal."""
-        pairs = [(0, 1)] if self.filling else []
-        for line in self.filling:
-            words = [word for words in AXES[:2] for word in words[:2] if (line, word) in self.index]
-            pairs += [(self.index[line, words[0]], self.index[line, word]) for word in words[1:]]
+        pairs = [(0, 1)] if self._filling else []
+        for line in self._filling:
+            sides = [self.index[line, word] for words in AXES[:2] for word in words[:2] if (line, word) in self.index]
+            pairs += [(sides[0], side) for side in sides[1:]]
         unit = np.eye(len(self.slots))
         return np.array([unit[a] - unit[b] for a, b in pairs]).reshape(-1, len(self.slots))
 
@@ -188,24 +170,19 @@ class Layout:
         return Group("divide", (*box.items(), ("gap", gap)), (part,), count, "xyz"[axis])
 
     def _with_radius(self, line: Line) -> Line:
-        """An upright round part with a radius in place of a width or depth; in the middle if it fills the whole."""
-        arguments = dict(line.keywords) if isinstance(line, Part) else {}
-        if not isinstance(line, Part) or line.kind not in ROUND or "start" in arguments:
+        """An upright round part with a radius in place of a width or depth; one that fills the whole is in its middle,
+        with both."""
+        if not isinstance(line, Part) or line.kind not in ROUND or "start" in dict(line.keywords):
             return line
-        ends = (ends_of(line, "", axis, self._sizes) for axis in range(2))
-        radius = arguments.get("radius", min(high - low for low, high in ends) / 2)
-        left_out = {*SIZES[:2], "radius", *((*AXES[0], *AXES[1]) if self._fills(line) else ())}
-        keywords = tuple(pair for pair in line.keywords if pair[0] not in left_out)
-        return replace(line, keywords=(*keywords, ("radius", radius)))
-
-    def _fills(self, part: Part | Group) -> bool:
-        """Whether a cylinder is nearly as wide as the whole."""
-        if part.kind != "cylinder":
-            return False
         width, depth = self._sizes["width"], self._sizes["depth"]
-        (left, right), (front, rear) = (ends_of(part, "", axis, self._sizes) for axis in range(2))
+        (left, right), (front, rear) = (ends_of(line, "", axis, self._sizes) for axis in range(2))
+        size = min(right - left, rear - front)
         off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
-        return min(right - left, rear - front) > TIES.fills * width and off < TIES.off_middle * width
+        left_out = {*SIZES[:2], "radius"}
+        keywords: Keywords = (("radius", dict(line.keywords).get("radius", size / 2)),)
+        if line.kind == "cylinder" and size > TIES.fills * width and off < TIES.off_middle * width:
+            left_out, keywords = {*AXES[0], *AXES[1], "radius"}, (("width", size), ("depth", size))
+        return replace(line, keywords=(*(pair for pair in line.keywords if pair[0] not in left_out), *keywords))
 
     def _ends(self, index: int, key: str, axis: int) -> tuple[float, float] | None:
         """The ends of an element of a line; ``None`` if a point is not given along this axis."""
@@ -219,14 +196,17 @@ class Layout:
             away = max(1, round(float(line.count)) - 1) * float(step)  # type: ignore[arg-type]
             low, high = ends_of(self.lines[first], inner, axis, self._sizes)
             return low + away, high + away
-        if key in ("plane", "centre") and keywords.keys().isdisjoint(AXES[axis]) and (key == "plane" or axis == 2):
+        if key in ("plane", "centre") and keywords.keys().isdisjoint(AXES[axis]):
             return None
         ends = ends_of(line, key, axis, self._sizes)
         if key in ("through", "end") and abs(ends[0] - ends_of(line, "start", axis, self._sizes)[0]) <= ALIGNED:
             return None
         return ends
 
-    def _element(self, index: int, key: str, axis: int, kind: ElementKind, ends: tuple[float, float]) -> Element:
+    def _element(self, index: int, key: str, axis: int, ends: tuple[float, float]) -> Element:
+        kind: ElementKind = "interval" if key in ("", "across") else "coordinate"
+        if kind == "interval" and axis < 2 and "radius" in dict(self.lines[index].keywords):
+            kind = "round"
         anchors = self._anchors.get((index, key, axis), (LOW, LOW) if kind == "interval" else (LOW,))
         self.elements[index, key, axis] = element = Element(index, key, axis, kind, *ends, anchors)
         return element
@@ -235,8 +215,7 @@ class Layout:
         """A line with a name for every number, measured from the anchors; lines are given in the order of the text."""
         assert isinstance(line, Part | Group)
         index, kind = len(self._named), "row" if line.kind == "translate" else line.kind
-        plain = [(word, self._plain(index, word, argument)) for word, argument in line.keywords
-                 if word in KINDS and index not in self.filling]  # fmt: skip
+        plain = [(word, self._plain(index, word, argument)) for word, argument in line.keywords if word in KINDS]
         keywords = sorted((*self._placed(index), *plain), key=lambda pair: pair[0] != "gap")
         self._named.append(replace(line, kind=kind, keywords=tuple(keywords)))
         return self._named[-1]
@@ -258,18 +237,16 @@ class Layout:
 
     def _along(self, index: int, axis: int) -> Iterator[tuple[str, Argument]]:
         """The keywords of a part in a box along an axis: clearances, size and offset, by its anchors."""
-        line, words, extent = self.lines[index], AXES[axis], self.extents[axis]
-        is_round = axis < 2 and line.kind in ROUND and index not in self.filling
-        ends = ends_of(line, "", axis, self._sizes)
-        element = self._element(index, "", axis, "round" if is_round else "interval", ends)
+        element = self._element(index, "", axis, ends_of(self.lines[index], "", axis, self._sizes))
         if len(set(element.anchors)) == 1:
             yield self._distance(element, element.anchors[0])
-            if not is_round:
-                yield words.size, self._slot(index, words.size, "size", axis, element.high - element.low)
+            if element.kind == "interval":
+                yield SIZES[axis], self._slot(index, SIZES[axis], "size", axis, element.high - element.low)
             return
-        for word, anchor, distance in zip(words, element.anchors, (element.low, extent - element.high), strict=False):
+        distances = element.low, self.extents[axis] - element.high
+        for word, anchor, distance in zip(AXES[axis], element.anchors, distances, strict=False):
             if anchor == MIDDLE:  # half of the whole, and as much more or less
-                value = self._slot(index, word, "offset", axis, distance - extent / 2)
+                value = self._slot(index, word, "offset", axis, distance - self.extents[axis] / 2)
                 yield word, Binary("+", Binary("/", Name(SIZES[axis]), 2.0), value)
             else:
                 yield word, self._slot(index, word, "clearance", axis, distance)
@@ -278,12 +255,10 @@ class Layout:
         pairs: list[tuple[str, Value]] = []
         for axis, words in enumerate(AXES):
             if ends := self._ends(index, key, axis):
-                element = self._element(index, key, axis, "coordinate", ends)
+                element = self._element(index, key, axis, ends)
                 (anchor,), off = element.anchors, element.middle - self.extents[axis] / 2
-                if key not in ("plane", "centre") or anchor != MIDDLE or abs(off) >= ALIGNED:
-                    pairs.append(self._distance(element, anchor))
-                elif key == "plane":
-                    pairs.append((words.offset, 0.0))
+                at_middle = key == "plane" and anchor == MIDDLE and abs(off) < ALIGNED
+                pairs.append((words.offset, 0.0) if at_middle else self._distance(element, anchor))
         return Point(tuple(pairs))
 
     def _across(self, index: int, axis: int) -> Value:
@@ -293,7 +268,7 @@ class Layout:
         off = max(abs(ends_of(bar, key, axis, self._sizes)[0] - extent / 2) for key in ("start", "end"))
         low, high = ends_of(bar, "across", axis, self._sizes)
         if axis < 2 and straight and off < TIES.off_middle * extent:
-            element = self._element(index, "across", axis, "interval", (low, high))
+            element = self._element(index, "across", axis, (low, high))
             if element.anchors == (LOW, HIGH):
                 value = self._slot(index, AXES[axis].low, "clearance", axis, (extent - (high - low)) / 2)
                 return Binary("-", Name(SIZES[axis]), Binary("*", 2.0, value))

@@ -26,23 +26,9 @@ PRIOR = {
 
 
 class Misfit:
-    """How far the surface of a program is from that of a target, about its numbers.
+    """How far the surface of a program is from that of a target, about its numbers; a refit keeps joints together.
 
-    Parameters
-    ----------
-    layout, evidence
-        The program and the target.
-    joints
-        Where its parts touch; a refit keeps them together.
-    minimum
-        Minimum weight (P,) of a squared move of every number.
-    seed
-        Of the pairs of points that are drawn.
-
-    Attributes
-    ----------
-    together
-        Weights (C,) of the squared gap at each joint.
+    ``minimum`` is the least weight (P,) of a squared move of every number.
     """
 
     def __init__(self, layout: Layout, evidence: Evidence, joints: Joints, minimum: FloatArray, seed: int) -> None:
@@ -53,7 +39,7 @@ class Misfit:
         self.reach: FloatArray = np.maximum(scale, 1.0)  # cells that the surface moves for one unit of every number
         prior = np.maximum([PRIOR[slot.kind] for slot in layout.slots], minimum)
         angles = np.array([slot.kind == "angle" for slot in layout.slots])
-        self.together: FloatArray = np.full(len(joints.pairs), TIES.together)
+        self.together: FloatArray = np.full(len(joints.pairs), TIES.together)  # weights of the squared gaps (C,)
         self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
 
     def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:

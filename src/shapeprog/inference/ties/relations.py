@@ -7,7 +7,6 @@ in fit is below that of the number they save are selected.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from itertools import chain, combinations
 from typing import NamedTuple
@@ -25,24 +24,12 @@ HOLDS = 1e-6  # deviation up to which a relation holds
 
 
 class Relation(NamedTuple):
-    """That factors times the numbers of a program sum to zero.
+    """That factors times the numbers of a program sum to zero."""
 
-    Parameters
-    ----------
-    row
-        The factors (P,).
-    trust
-        Price of the number that it saves, as a multiple of the usual one.
-    meetings
-        Pairs of lines whose parts meet face to face where it holds, each with the axis.
-    limit
-        Largest deviation, in cells or degrees, with which it is considered.
-    """
-
-    row: FloatArray
-    trust: float
-    meetings: frozenset[tuple[int, int, int]] = frozenset()
-    limit: float = TIES.within
+    row: FloatArray  # the factors (P,)
+    trust: float  # price of the number that it saves, as a multiple of the usual one
+    meetings: frozenset[tuple[int, int, int]] = frozenset()  # lines whose parts then meet face to face, with the axis
+    limit: float = TIES.within  # largest deviation, in cells or degrees, with which it is considered
 
 
 class _Face(NamedTuple):
@@ -65,15 +52,8 @@ class _Face(NamedTuple):
 
 
 def relations(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
-    """Distinct relations that nearly hold, each with its highest trust.
-
-    Parameters
-    ----------
-    layout, numbers
-        The program, and where its numbers are (P,).
-    touching
-        Pairs of lines, the smaller first, whose parts touch.
-    """
+    """Distinct relations that nearly hold where the numbers are these (P,), each with its highest trust; ``touching``
+    are the pairs of lines, the smaller first, whose parts touch."""
     best: dict[bytes, Relation] = {}
     for relation in chain(_of_faces(layout, numbers, touching), _of_numbers(layout, numbers)):
         used = np.flatnonzero(relation.row)
@@ -115,8 +95,6 @@ def worthwhile(
         Lower bounds (F,) of the products of these rows (F, V) with the numbers; no relation may violate them.
     """
     rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
-    if not len(rows):
-        return rows, numbers
     imposed, free, axes, edges = list[FloatArray](), np.linalg.inv(curvature), rows[:0], 0
     low = np.minimum(low, bounded @ numbers) - HOLDS
     meeting = [(k, *pair) for k, relation in enumerate(candidates) for pair in relation.meetings]
@@ -127,9 +105,9 @@ def worthwhile(
     minimum = 1e-9 * spread
     while True:
         gain = np.where(spread > minimum, benefit - off**2 / np.maximum(spread, minimum), -np.inf)
-        best = int(np.argmax(gain))
-        if gain[best] <= 0:
+        if gain.max(initial=0.0) <= 0:
             return np.array(imposed).reshape(-1, len(numbers)), numbers
+        best = int(gain.argmax())
         along = free @ rows[best]
         moved = numbers - along * off[best] / spread[best]
         across = rows @ along
@@ -148,15 +126,15 @@ def worthwhile(
 
 
 def _edges(meetings: list[tuple[int, int, int, int]], holds: npt.NDArray[np.bool_]) -> int:
-    """How many pairs of lines meet along more than one axis, by relations that hold."""
+    """Along how many axes beyond the first pairs of lines meet, by relations that hold."""
     met = {(first, second, axis) for index, first, second, axis in meetings if holds[index]}
-    return sum(count > 1 for count in Counter((first, second) for first, second, _ in met).values())
+    return len(met) - len({(first, second) for first, second, _ in met})
 
 
 def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
     """Zeros, equal lengths and angles, and equal clearances of a part along two axes."""
     slots, eye = layout.slots, np.eye(len(layout.slots))
-    floor = TIES.at_floor * numbers[2]
+    floor = TIES.reach * numbers[2]
     for k, slot in enumerate(slots):
         if slot.kind == "clearance":
             if slot.word.endswith("bottom") and numbers[k] < floor:
@@ -166,8 +144,8 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
         elif slot.kind == "gap" and abs(slot.value) <= TIES.touch:
             yield Relation(eye[k], TIES.equal)
         elif slot.kind == "offset":
-            limit = TIES.plane if slot.word.startswith("plane") else TIES.askew
-            yield Relation(eye[k], TIES.symmetric(slot.axis), limit=limit)
+            limit = TIES.plane if slot.word.startswith("plane") else TIES.within
+            yield Relation(eye[k], TIES.symmetric[slot.axis], limit=limit)
         elif slot.kind == "angle" and slot.word != "step":
             yield Relation(eye[k], TIES.equal, limit=TIES.degrees)
     for (a, slot), (b, other) in combinations(enumerate(slots), 2):
@@ -203,25 +181,21 @@ def _of_faces(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]
     """Relations of pairs of faces of one axis, those of mirror images included."""
     unit = np.eye(len(numbers))
     faces: list[_Face] = []
-    images: list[_Face] = []
     for element, low, high in layout.ends():
         rows = {0: low} if element.kind == "coordinate" else {-1: low, 0: (low + high) / 2, 1: high}
-        for facing, row in rows.items():
-            faces.append(_Face(element, row, float(row @ numbers), facing))
-            if _is_mirrored(layout, element):
-                image = unit[element.axis] - row
-                images.append(_Face(element, image, float(image @ numbers), -facing))
+        faces += [_Face(element, row, float(row @ numbers), facing) for facing, row in rows.items()]
     for axis, extent in enumerate(numbers[:3]):
-        for face, other in combinations([face for face in faces + images if face.element.axis == axis], 2):
+        along = [face for face in faces if face.element.axis == axis]
+        mirrored = [face for face in along if _is_mirrored(layout, face.element)]
+        along += [_Face(element, unit[axis] - row, extent - at, -facing) for element, row, at, facing in mirrored]
+        for face, other in combinations(along, 2):
             off = min(abs(face.at - other.at), abs(face.at + other.at - extent))
-            if off <= 2 * TIES.askew:  # no relation allows more
+            if off <= 2 * TIES.within:  # no relation allows more
                 yield from _pair(layout, face, other, touching)
 
 
 def _is_mirrored(layout: Layout, element: Element) -> bool:
     """Whether a mirror about the middle of the whole copies a part along the axis of its element."""
-    if element.key not in ("", "start", "through", "end"):
-        return False
     axis = element.axis
     planes = (layout.elements.get((loop, "plane", axis)) for loop in layout.loops_around[element.line])
     return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < TIES.within for plane in planes)
@@ -240,8 +214,8 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
     touches = lines[0] != lines[1] and tuple(lines) in touching
     if face.anchor != other.anchor:
         if {face.anchor, other.anchor} == {LOW, HIGH} and single and axis < 2:
-            trust = TIES.contact if "last" in keys else TIES.equal
-            yield Relation(image, TIES.symmetric(axis), limit=TIES.askew) if same else Relation(image, trust)
+            apart = TIES.contact if "last" in keys else TIES.equal
+            yield Relation(image, TIES.symmetric[axis] if same else apart)
     elif middles:
         if touches and axis < 2 and any(points) and not single:
             yield Relation(row, TIES.straight)
@@ -249,7 +223,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
         if first.key and second.key:  # both ends of a rod
             yield Relation(row, TIES.straight)
             if face.anchor == MIDDLE:
-                yield Relation(image, TIES.symmetric(axis), limit=TIES.askew)
+                yield Relation(image, TIES.symmetric[axis])
     elif keys & {"last", "plane", "centre"}:
         if "last" in keys and touches and (face.single or other.single):
             yield Relation(row, TIES.contact)

@@ -25,8 +25,8 @@ class TieSettings:
 
     # Price of the number that a relation saves, as a multiple of the usual price
     floor: float = 6.0  # a part that ends just above the floor
-    centred: float = 4.0  # equal clearances on the left and right
-    contact: float = 2.0  # faces that meet; equal clearances in front and at the rear
+    symmetric: tuple[float, float] = (4.0, 2.0)  # equal clearances on the left and right, in front and at the rear
+    contact: float = 2.0  # faces that meet
     straight: float = 1.5  # ends of a rod at equal distances, or on the middle line of a part that it touches
     # Zeros; equal sections, equal sizes of parts of one role, and equal clearances, of a part at a corner, of parts
     # at one side or at opposite sides, or of a row along one axis
@@ -35,9 +35,7 @@ class TieSettings:
     # By how much a relation may be off
     within: float = 0.3  # lengths
     plane: float = 0.1  # planes of mirrors off the middle
-    askew: float = 0.3  # equal clearances on both sides
     degrees: float = 2.0  # angles; also of bars about themselves whose sides follow those of the whole
-    at_floor: float = 0.02  # share of the height of the whole up to which a part touches the floor
     alike: float = 0.25  # equal sizes, as a share of the larger
     rounding: float = 0.05  # which is added to that
     section: float = 3.0  # sizes below this along different axes may be the two sides of one section
@@ -55,7 +53,7 @@ class TieSettings:
     from_top: float = 0.25  # of a height measured from the top by a part that is not near it: people expect the floor
 
     # Shares of the whole
-    reach: float = 0.02  # up to this a face reaches a side
+    reach: float = 0.02  # up to this a face reaches a side, or a part the floor
     beyond: float = 0.3  # parts wholly beyond this share of the half are near that side
     below: float = 0.1  # parts whose top is so far below that of the whole are near the top
     board: float = 0.4  # the thickness of a board is at most this share of its next longer side
@@ -85,10 +83,6 @@ class TieSettings:
     board_off: float = 0.5  # if it is off the middle by no more than this
     board_wide: float = 12.0  # or is no wider than this
     thin: float = 0.6  # the thickness of a part is at most this share of its next longer side
-
-    def symmetric(self, axis: int) -> float:
-        """The price of equal clearances on both sides along a horizontal axis."""
-        return self.centred if axis == 0 else self.contact
 
 
 TIES = TieSettings()

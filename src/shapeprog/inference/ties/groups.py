@@ -5,18 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 from typing import TypeGuard
 
 import numpy as np
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source
+from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
 from shapeprog.language.convert.forms import cost
 from shapeprog.language.evaluate import placed_source, symbolic
 from shapeprog.language.expression import Expression
 from shapeprog.language.merging import merged_lines
-from shapeprog.language.placement import AXES, BOX, SIZES, axis_of
+from shapeprog.language.placement import AXES, BOX, SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
@@ -52,22 +53,16 @@ def _has_box(line: Line) -> TypeGuard[Part | Group]:
 
 
 def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...]:
-    """Lines that draw, merged, and with parts and loops of equal clearances in boxes where that saves words.
-
-    Parameters
-    ----------
-    lines
-        Lines that draw, without groups but loops.
-    numbers
-        The values of all names.
-    """
+    """Parts and loops, given the values of all names: merged, and in boxes with the clearances that they share where
+    that saves words."""
     lines = merged_lines(lines)
     while True:
         sides = {line: _sides(line) for line in lines if not isinstance(line, Group) or line.kind != "inside"}
         frames = {one & other for one, other in combinations(sides.values(), 2)} - {frozenset()}
         best, saved = lines, 0
         for frame in sorted((tuple(sorted(frame, key=lambda side: BOX.index(side[0]))) for frame in frames), key=str):
-            inner = {line: _inside(line, frame) for line in sides}
+            moved = changed_lines(sides, partial(_inside, frame=frame))
+            inner = dict(zip(sides, moved, strict=True))
             members = [
                 line for line in sides
                 if line != inner[line] and _same(line, Group("inside", frame, (inner[line],)), numbers)
@@ -90,17 +85,14 @@ def _sides(line: Line) -> frozenset[tuple[str, Argument]]:
 
 
 def _inside(line: Line, frame: Keywords) -> Line:
-    """The line in a box with these clearances, which its parts then do not have."""
+    """What has a box in one with these clearances; it keeps zeros in their place where its size needs a side."""
     if not _has_box(line):
-        assert isinstance(line, Group)
-        return replace(line, body=tuple(_inside(inner, frame) for inner in line.body))
-    arguments, keywords = dict(line.keywords), list[tuple[str, Argument]]()
-    for word, value in line.keywords:
-        if (word, value) not in frame:
-            keywords.append((word, value))
-        elif AXES[axis_of(word)].size in arguments and word != "bottom":
-            keywords.append((word, 0.0))
-    return replace(line, keywords=tuple(keywords))
+        return line
+    needed = {word for words in AXES if words.size in dict(line.keywords) for word in words} - {"bottom"}
+    return replace(line, keywords=tuple(
+        (word, 0.0 if (word, value) in frame else value)
+        for word, value in line.keywords if (word, value) not in frame or word in needed
+    ))  # fmt: skip
 
 
 def _words(line: Line) -> int:

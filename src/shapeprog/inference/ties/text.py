@@ -4,7 +4,7 @@ the parts and keywords that use them."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,15 +16,20 @@ from shapeprog.inference.ties.groups import grouped, simplified
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Assignment, Group, Line, Part, Point, Source, changed_lines, changed_values, values
-from shapeprog.language.expression import Expression, Linear, Name, Value, combined, names_in, replaced, value_at
+from shapeprog.language.expression import Expression, Linear, Name, Value, names_in, replaced
 from shapeprog.language.merging import merged_lines
-from shapeprog.language.parameters import to_float32
-from shapeprog.language.placement import AXES, BOX, RESERVED, SIZES, axis_of
+from shapeprog.language.placement import BOX, RESERVED, SIZES
 from shapeprog.language.statement import language
 from shapeprog.space import FloatArray
 
 FLAT = ("seat", "top", "shelf", "mattress", "cushion", "pillow")
 """Parts whose height is called thickness: the height of a seat is that of its top above the floor."""
+
+PLACES = {
+    "left": "inset", "right": "inset", "front": "setback", "rear": "setback", "top": "drop",
+    "x": "offset", "y": "offset", "z": "offset",
+}  # fmt: skip
+"""The quantities that keywords measure whose names do not say so."""
 
 FURTHER = {
     "inset": ("outer", "inner"), "setback": ("outer", "inner"), "clearance": ("outer", "inner"),
@@ -34,23 +39,21 @@ FURTHER = {
 
 
 def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool = True) -> Source:
-    """The program with names for its shared numbers and expressions for those that follow.
-
-    Parameters
-    ----------
-    layout, solution
-        The program, and how its numbers follow from free ones.
-    free
-        The values of these (Z,).
-    group
-        Whether lines are grouped where that is shorter.
-    """
-    is_round = np.array_equal(solution.factors[0], solution.factors[1])
+    """The program, given the values (Z,) of its free numbers, with names for those that are shared and expressions for
+    what follows; lines may be grouped where that is shorter."""
+    is_round = np.array_equal(*solution.factors[:2])
     width, depth, height = (solution.factors[:3] @ free).tolist()
     header = [Assignment((("diameter", width),))] if is_round else []
     extents = (Name("diameter"), Name("diameter"), height) if is_round else (width, depth, height)
     header.append(Assignment(tuple(zip(SIZES, extents, strict=True))))
-    shared, table = _expressions(layout, solution, free, "diameter" if is_round else "")
+    numbers = sorted((k, float(value) + 0.0) for k, value in zip(solution.free, free, strict=True))
+    shared: dict[str, Value] = {layout.names[k]: value for k, value in numbers if k > 2}
+    table = _expressions(layout, solution)
+    sums: dict[Value, str] = {}
+    for name, value in table.items():
+        if isinstance(value, Expression) and not isinstance(value, Name):
+            table[name] = Name(sums.setdefault(value, f"{name}_sum"))
+    shared |= {name: value for value, name in sums.items()}
     body, shared = _inlined(_changed(layout.body, table), shared)
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
     body = changed_lines(body, lambda line: simplified(line, known))
@@ -58,40 +61,27 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     names = named(body, shared, known)
     final: dict[str, Value] = {provisional: Name(name) for provisional, name in names.items()}
     pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
-    for sums in (False, True):
-        header += _assignments([pair for pair in pairs if isinstance(pair[1], Expression) == sums])
+    for are_sums in (False, True):
+        header += _assignments([pair for pair in pairs if isinstance(pair[1], Expression) == are_sums])
     scale = layout.source.scale
     assert scale is not None
     floor = scale.floor + (layout.extents[2] - float(known["height"])) * scale.cells_per_unit / 2
     return Source((*header, *_changed(body, final)), layout.source.unit, replace(scale, floor=floor))
 
 
-def _expressions(
-    layout: Layout, solution: Solution, at_free: FloatArray, diameter: str
-) -> tuple[dict[str, Value], dict[str, Value]]:
-    """The free numbers, and sums that several numbers are, by provisional name; and all numbers by these names."""
-    names, factors, free = layout.names, solution.factors, solution.free
-    atoms = [Name(names[k] if k > 1 else diameter or names[k]) for k in free]
-    order = sorted((layout.slots[k].line, k, float(value) + 0.0) for k, value in zip(free, at_free, strict=True))
-    shared: dict[str, Value] = {names[k]: value for _, k, value in order if k > 2}
-    alike: dict[bytes, list[int]] = {}  # numbers that follow from the free ones in the same way
-    for p in range(3, len(names)):
-        alike.setdefault(factors[p].round(6).tobytes(), []).append(p)
+def _expressions(layout: Layout, solution: Solution) -> dict[str, Value]:
+    """How the numbers follow from the free ones, by name."""
     table: dict[str, Value] = {}
-    for first, *others in alike.values():
-        name = f"{names[first]}_sum"
-        terms = [(atoms[z], float(factors[first, z])) for z in np.flatnonzero(factors[first])]
-        value = combined(0.0, terms)
-        if others and isinstance(value, Expression) and not isinstance(value, Name):
-            shared[name], value = value, Name(name)
-        table |= {names[k]: value for k in (first, *others)}
-    return shared, table
+    for name, factors in zip(layout.names[3:], solution.factors[3:].round(12).tolist(), strict=True):
+        terms = zip((layout.names[k] for k in solution.free), factors, strict=True)
+        table[name] = Linear(0.0, tuple(term for term in terms if term[1])).written()
+    return table
 
 
 def _inlined(lines: tuple[Line, ...], shared: Mapping[str, Value]) -> tuple[tuple[Line, ...], dict[str, Value]]:
     """Lines and named values without the names that are used once."""
-    uses = Counter(name for line in Source(lines).walk() for value in values(line) for name in names_in(value))
-    uses += Counter(name for value in shared.values() for name in names_in(value))
+    every = Source((Assignment(tuple(shared.items())), *lines)).walk()
+    uses = Counter(name for line in every for value in values(line) for name in names_in(value))
     once: dict[str, Value] = {}
     for name, value in shared.items():  # sums come last
         if uses[name] < 2:
@@ -104,9 +94,8 @@ def _with(value: Value, table: Mapping[str, Value]) -> Value:
     new = replaced(value, lambda each: table.get(each.name, each) if isinstance(each, Name) else each)
     if not isinstance(new, Expression):
         return new
-    form = value_at(new, {name: Linear.of(name) for name in names_in(new)})
-    terms = sorted(form.factors, key=lambda term: term[1] < 0)
-    return combined(to_float32(form.constant), [(Name(name), factor) for name, factor in terms])
+    form: Linear = new.at({name: Linear.of(name) for name in names_in(new)})
+    return form.written()
 
 
 def _changed(lines: tuple[Line, ...], table: Mapping[str, Value]) -> tuple[Line, ...]:
@@ -138,41 +127,32 @@ class Use(NamedTuple):
 
 
 def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str, float]) -> dict[str, str]:
-    """A name for each of some numbers.
-
-    Parameters
-    ----------
-    lines
-        The lines that draw; in them these numbers have provisional names.
-    wanted
-        The provisional names with their values, plain numbers first.
-    numbers
-        What all names evaluate to.
-    """
+    """A name for each of the provisional names in lines, given with their values, plain numbers first, and what all
+    names evaluate to."""
     every = [*_uses(lines)]
-    uses: dict[str, list[Use]] = {}  # of numbers that are used in sums alone, those of the sums
-    for name in reversed([*wanted]):
-        uses[name] = [use for use, value in every if value == Name(name)] or [
-            *(use for use, value in every if name in names_in(value)),
-            *(use for outer in uses if name in names_in(wanted[outer]) for use in uses[outer]),
-        ]
     words = language()
-    used = {*SIZES, "diameter", *RESERVED, *words.names, *words.roles}
-    values: dict[str, float] = {}  # of the names given
+    taken = dict.fromkeys((*SIZES, "diameter", *RESERVED, *words.names, *words.roles), 0.0)  # names with their values
     result: dict[str, str] = {}
     for provisional in wanted:
         number = numbers[provisional]
-
-        def further(base: str, number: float = number) -> str:
-            less, larger = FURTHER.get(base.rpartition("_")[2], ("small", "large"))
-            return f"{larger if abs(number) > abs(values.get(base, 0.0)) else less}_{base}"
-
-        shared, own = _candidates(uses[provisional], numbers)
-        offered = [*shared, *(further(base) for base in shared if base in FURTHER), *own, *map(further, own)]
+        uses = [use for use, value in every if value == Name(provisional)] or [  # or else of sums with it
+            use for use, value in every for name in names_in(value)
+            if provisional in (name, *names_in(wanted.get(name, 0.0)))
+        ]  # fmt: skip
+        shared, own = _candidates(uses, numbers)
+        placing = [base for base in shared if base in FURTHER]
+        offered = [*shared, *_further(placing, number, taken), *own, *_further(own, number, taken)]
         offered += (f"{own[0]}_{count}" for count in range(2, len(wanted) + 2))
-        result[provisional] = name = next(name for name in offered if name not in used | values.keys())
-        values[name] = number
+        result[provisional] = name = next(name for name in offered if name not in taken)
+        taken[name] = number
     return result
+
+
+def _further(names: Iterable[str], number: float, taken: Mapping[str, float]) -> Iterator[str]:
+    """Names for a number beside another that has the name itself."""
+    for name in names:
+        less, larger = FURTHER.get(name.rpartition("_")[2], ("small", "large"))
+        yield f"{larger if abs(number) > abs(taken.get(name, 0.0)) else less}_{name}"
 
 
 def _uses(lines: Sequence[Line]) -> Iterator[tuple[Use, Value]]:
@@ -180,8 +160,8 @@ def _uses(lines: Sequence[Line]) -> Iterator[tuple[Use, Value]]:
     for line in Source(tuple(lines)).walk():
         if isinstance(line, Part | Group):
             inner = [each for each in Source((line,)).walk() if isinstance(each, Part)]
-            parts = inner if isinstance(line, Group) and line.kind == "inside" else inner[:1]
-            if isinstance(line, Group) and line.kind == "divide":  # its parts have the sides of its box
+            parts = inner if line.kind == "inside" else inner[:1]
+            if line.kind == "divide":  # its parts have the sides of its box
                 box = tuple(pair for pair in line.keywords if pair[0] in BOX)
                 parts = [replace(part, keywords=(*box, *part.keywords)) for part in parts]
             for key, argument in line.keywords:
@@ -210,20 +190,15 @@ def _candidates(uses: Sequence[Use], numbers: dict[str, float]) -> tuple[list[st
     # The second point of a part is not where the part is: the upper end of a leg is no ``leg_bottom``.
     plain = [use for use in selected if use.point not in ("through", "end")]
     own = [f"{role}_{kind}" for role, _ in Counter(use.role for use in plain).most_common()]
-    own += [f"{use.role}_{quantities[use]}" for use in plain]
     own += [f"{use.role}_{use.point}_{quantities[use]}" for use in selected if use.point]
     return shared, own
 
 
 def _quantity(use: Use, numbers: dict[str, float]) -> str:
     """The measured quantity, as the end of a name."""
-    if use.word not in BOX:
-        return use.word
-    axis, part = axis_of(use.word), use.part
-    if use.word != SIZES[axis]:
-        low = "bottom" if use.word == "bottom" else "drop"
-        return "offset" if use.word == AXES[axis].offset else ("inset", "setback", low)[axis]
-    lengths = [high - low for low, high in (ends_of(part, "", each, numbers) for each in range(3))]
-    flat = axis == 2 and use.role in FLAT
-    least, second, _ = sorted(lengths)
-    return "thickness" if flat or lengths[axis] <= least <= TIES.thin * second else SIZES[axis]
+    if use.word not in SIZES:
+        return PLACES.get(use.word, use.word)
+    lengths = {word: np.ptp(ends_of(use.part, "", axis, numbers)) for axis, word in enumerate(SIZES)}
+    least, second, _ = sorted(lengths.values())
+    flat = use.word == "height" and use.role in FLAT
+    return "thickness" if flat or lengths[use.word] <= least <= TIES.thin * second else use.word

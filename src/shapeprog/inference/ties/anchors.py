@@ -18,7 +18,7 @@ from torch import Tensor
 
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.scene import Scene
-from shapeprog.geometry.separation import touching
+from shapeprog.geometry.separation import OrientedBoxes, gaps, touching
 from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, Key, boxes_of
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
@@ -33,17 +33,17 @@ class _AxisAnchors:
     ----------
     layout, axis
         The program, with all faces measured from the low side, and the axis.
-    ends, slopes
-        The low and high ends (2, N) of its primitives from the low side of the whole, and how these move with its
-        numbers (2, N, P).
+    boxes, slopes
+        The boxes of its primitives (N,) from the low corner of the whole, and how these move with its numbers
+        (N, 3, P) and (N, 3, 3, P).
     pairs
         Slots of primitives that touch (C,), (C,).
     """
 
     def __init__(
-        self, layout: Layout, axis: int, ends: FloatArray, slopes: FloatArray, pairs: tuple[Array, Array]
+        self, layout: Layout, axis: int, boxes: OrientedBoxes, slopes: OrientedBoxes, pairs: tuple[Array, Array]
     ) -> None:
-        self.axis, self.extent, self.pairs, self.ends = axis, layout.extents[axis], pairs, ends
+        self.axis, self.extent, self.pairs, self.boxes = axis, layout.extents[axis], pairs, boxes
         self.elements = [element for element in layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
@@ -57,26 +57,25 @@ class _AxisAnchors:
         self.costs = np.full((count, most), np.inf)
         # By which share of the growth of the whole low and high ends move.
         self.shifts = np.full((count, most, 2), np.nan)
-        by_ends = np.zeros((slopes.shape[-1], count, 2))  # how the numbers follow from the ends of the elements
+        by_ends = np.zeros((slopes.centre.shape[-1], 2 * count))  # how the numbers follow from the ends of the elements
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
             self.shifts[k, : len(choices)] = [(anchors[0] / HIGH, anchors[-1] / HIGH) for anchors in choices]
             if element.kind == "interval":
-                by_ends[layout.index[element.line, AXES[axis].size], k] = -1, 1
+                by_ends[layout.index[element.line, AXES[axis].size], 2 * k : 2 * k + 2] = -1, 1
             if element.key != "across":
-                by_ends[layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")], k, 0] = 1
-        self.slopes = (slopes @ by_ends.reshape(-1, 2 * count)).swapaxes(1, 2)  # (2, 2 K, N)
+                by_ends[layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")], 2 * k] = 1
+        self.slopes = OrientedBoxes(slopes.centre @ by_ends, slopes.edges @ by_ends)
         # Mirror images move with the high side of the whole while all coordinates stay.
-        self.base = slopes[..., axis] + 0.5
-        low, high = ends
-        self.share, self.long = ends / self.extent, high - low >= TIES.spanning * self.extent
+        self.base = OrientedBoxes(slopes.centre[..., axis] + np.eye(3)[axis] / 2, slopes.edges[..., axis])
+        low, high = self.ends = _ends(boxes, axis)
+        self.share, self.long = self.ends / self.extent, high - low >= TIES.spanning * self.extent
         reach, near = TIES.reach * self.extent, (1 - TIES.beyond) * self.extent / 2
         reaches = np.stack([low <= low.min() + reach, high >= high.max() - reach])
         beyond = np.stack([high <= near, low >= self.extent - near])
         if axis == 2:
             beyond = np.stack([reaches[0], high >= high.max() - TIES.below * self.extent])
         self.weights = TIES.side * (reaches | beyond)  # of faces that do not move
-        self.overlap = self._overlaps(low, high)
 
     def _is_thickness(self, layout: Layout, element: Element) -> bool:
         """Whether a part is a board across the axis: a person expects it to keep its thickness."""
@@ -133,71 +132,92 @@ class _AxisAnchors:
         # From one side, or where that is no choice in the first way.
         one_sided = [(self.shifts == side / HIGH).all(2).argmax(1) for side in (LOW, HIGH)]
         starts = [self.costs.argmin(1), *one_sided]
-        best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
-        return [choices[k] for choices, k in zip(self.choices, best[1], strict=True)]
+        _, best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
+        if self._costs(best[None], exact=True) >= TIES.separated:  # this takes longer
+            _, best = self._descent(best, exact=True)
+        return [choices[k] for choices, k in zip(self.choices, best, strict=True)]
 
-    def _descent(self, state: Array) -> tuple[float, Array]:
+    def _descent(self, state: Array, *, exact: bool = False) -> tuple[float, Array]:
         """The cost and state (K,) from which no change of an element is cheaper."""
-        total = float(self._costs(state[None])[0])
+        total = float(self._costs(state[None], exact=exact)[0])
         for _ in range(8):
             before = state
             for k, choices in enumerate(self.choices):
                 trials = np.repeat(state[None], len(choices), 0)
                 trials[:, k] = np.arange(len(choices))
-                costs = self._costs(trials)
+                costs = self._costs(trials, exact=exact)
                 if costs.min() < total - 1e-9:
                     state, total = trials[costs.argmin()], float(costs.min())
             if state is before:
                 break
         return total, state
 
-    def _overlaps(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """How far pairs (..., C) of primitives that touch overlap along the axis, from their ends (..., N)."""
-        first, second = self.pairs
-        return np.minimum(high[..., first], high[..., second]) - np.maximum(low[..., first], low[..., second])
-
-    def _costs(self, states: Array) -> FloatArray:
-        """The costs (S,) of choices of anchors (S, K)."""
-        elements, (below, above) = np.arange(states.shape[1]), self.ends
+    def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
+        """The costs (S,) of choices of anchors (S, K); parts are separated if they are along the axis, or exactly."""
+        elements, growth = np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
             cost += penalty * (states[:, start] != states[:, end])
         for last, first in self.rows.items():  # a row gives a side or the middle of its last copy
             shifts[:, last] -= shifts[:, last, :1] * (shifts[:, first, 1:] - shifts[:, first, :1])
         flat = shifts.reshape(len(states), -1)
-        low, high = self.base[:, None] + flat @ self.slopes
+        moves = (np.moveaxis(slopes @ flat.T, -1, 0) for slopes in self.slopes)
+        parts = zip(self.boxes, self.base, moves, strict=True)
+        grown = OrientedBoxes(*(start + growth * (base + move) for start, base, move in parts))
+        ends = _ends(grown, self.axis)
+        low, high = (ends - self.ends[:, None]) / growth
         # A face near a side moves with it, or keeps its proportion.
         stays = np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9
         lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
         cost += stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
-        growth = TIES.growth * self.extent
-        grown = self._overlaps(below + growth * low, above + growth * high)
-        cost += TIES.separated * (grown < np.minimum(self.overlap, 0) - TIES.touch).sum(1)
-        return cost
+        before, after = (self._apart(boxes, exact=exact) for boxes in (self.boxes, grown))
+        return cost + TIES.separated * (after > np.maximum(before, 0) + TIES.touch).sum(-1)
+
+    def _apart(self, boxes: OrientedBoxes, *, exact: bool) -> FloatArray:
+        """By how much pairs (..., C) of boxes (..., N) that touch are apart, along the axis or in any direction."""
+        first, second = self.pairs
+        if not exact:
+            low, high = _ends(boxes, self.axis)
+            return np.maximum(low[..., first], low[..., second]) - np.minimum(high[..., first], high[..., second])
+        count, pairs = boxes.centre.shape[-2], np.stack(self.pairs)[:, None]
+        states = boxes.centre.size // (3 * count)
+        flat = OrientedBoxes(boxes.centre.reshape(-1, 3), boxes.edges.reshape(-1, 3, 3))
+        first, second = (pairs + count * np.arange(states)[:, None]).reshape(2, -1)
+        return gaps(flat, first, second).reshape(*boxes.centre.shape[:-2], -1)
 
 
-def _ends(scene: Scene, change: Float[Tensor, "N 16"]) -> FloatArray:
-    """The low and high ends (2, 3, N) of the boxes of primitives where sizes, centres and rotations change."""
+def _ends(boxes: OrientedBoxes, axis: int) -> FloatArray:
+    """The low and high ends (2, ...) of boxes along an axis."""
+    reach = np.abs(boxes.edges[..., axis]).sum(-1)
+    return np.stack([boxes.centre[..., axis] - reach, boxes.centre[..., axis] + reach])
+
+
+def _boxes(scene: Scene, change: Float[Tensor, "N 16"]) -> OrientedBoxes:
+    """The boxes of primitives where sizes, centres and rotations change."""
     size, centre, rotation = change.split([SIZES, 3, 9], 1)
     rotation = scene.rotation + rotation.reshape(-1, 3, 3)
-    boxes = boxes_of(replace(scene, size=scene.size + size, centre=scene.centre + centre, rotation=rotation))
-    reach = np.abs(boxes.edges).sum(1)
-    return np.stack([boxes.centre - reach, boxes.centre + reach]).swapaxes(1, 2)
+    return boxes_of(replace(scene, size=scene.size + size, centre=scene.centre + centre, rotation=rotation))
+
+
+def _slopes(scene: Scene, rows: Float[Tensor, "N 16 P"]) -> OrientedBoxes:
+    """How the boxes of primitives follow from numbers: their centres (N, 3, P) and edges (N, 3, 3, P)."""
+    ways = [(_boxes(scene, 1e-3 * row), _boxes(scene, -1e-3 * row)) for row in rows.unbind(-1)]
+    changes = [[(after - before) / 2e-3 for after, before in zip(*way, strict=True)] for way in ways]
+    return OrientedBoxes(*(np.stack(change, -1) for change in zip(*changes, strict=True)))
 
 
 def anchors_of(layout: Layout) -> dict[Key, Anchors]:
     """The anchors of all elements of a program, given with all faces measured from the low side."""
     (scene, rows), (width, depth, _), scale = layout.poses(layout.numbers), layout.extents, layout.source.scale
     assert scale is not None
-    corner = np.array([-width / 2, scale.middle - depth / 2, scale.floor])[:, None]
-    ends = _ends(scene, 0 * rows[..., 0]) - corner
-    changes = (1e-3 * rows).unbind(-1)
-    slopes = np.stack([(_ends(scene, change) - _ends(scene, -change)) / 2e-3 for change in changes], -1)
-    pairs = touching(boxes_of(scene), TIES.touch)
+    boxes = boxes_of(scene)
+    pairs = touching(boxes, TIES.touch)
+    boxes = boxes._replace(centre=boxes.centre - [-width / 2, scale.middle - depth / 2, scale.floor])
+    slopes = _slopes(scene, rows)
     result: dict[Key, Anchors] = {}
     for axis in range(3):
-        solver = _AxisAnchors(layout, axis, ends[:, axis], slopes[:, axis], pairs)
+        solver = _AxisAnchors(layout, axis, boxes, slopes, pairs)
         for element, anchors in zip(solver.elements, solver.solved(), strict=True):
             result[element.line, element.key, axis] = anchors
         for last, first in solver.rows.items():

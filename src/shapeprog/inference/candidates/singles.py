@@ -2,7 +2,8 @@
 
 Every statement with a hint is tried on every piece; statements without a hint are tried on the most important pieces,
 with many starts.  The best are fitted to the points of the piece.  Of those with nearly equal misfit, the one with the
-fewest numbers is a candidate, so that copies have the same statement.
+fewest numbers is a candidate, so that copies have the same statement, and the best one where
+its misfit is clearly less.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ from shapeprog.inference.pieces.pieces import Pieces
 from shapeprog.inference.pieces.point_kernels import near_boxes
 from shapeprog.language.hints import Box
 from shapeprog.language.printer import numbers_written
-from shapeprog.language.program import Draw, Program
+from shapeprog.language.program import Draw, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import Plan
 from shapeprog.space import Array, FloatArray
 
 
-def single_candidates(pieces: Pieces) -> list[Draw]:
-    """The simplest drawing statement that fits, for every piece with points, in the order of the pieces."""
+def single_candidates(pieces: Pieces) -> list[Node]:
+    """The simplest drawing statement for every piece with points, in the order of the pieces, and a closer one."""
     points, normals, indices = _target(pieces)
     half = np.maximum(pieces.boxes.half, THINNEST / 2)
     boxes = [Box(pieces.boxes.centre[piece], pieces.boxes.rotation[piece], half[piece]) for piece in indices]
@@ -54,7 +55,13 @@ def single_candidates(pieces: Pieces) -> list[Draw]:
     order = np.flatnonzero(misfit <= best + SETTINGS.slack).tolist()
     order.sort(key=lambda k: (numbers_written(draws[k]), misfit[k]), reverse=True)
     simplest = {int(owner[k]): k for k in order}
-    return [draws[k] for _, k in sorted(simplest.items())]
+    closest = {int(owner[k]): k for k in order if misfit[k] == best[k]}
+    result: list[Node] = []
+    for piece, k in sorted(simplest.items()):
+        result.append(draws[k])
+        if misfit[closest[piece]] < min(SETTINGS.good, SETTINGS.better * misfit[k]):
+            result.append(draws[closest[piece]])
+    return result
 
 
 def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:

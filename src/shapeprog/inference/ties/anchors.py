@@ -95,7 +95,7 @@ class _AxisAnchors:
         if centred:
             return [(LOW, HIGH), (MIDDLE, MIDDLE)]
         pairs = [(LOW, LOW), (LOW, HIGH), (HIGH, HIGH)]
-        return pairs + ([(MIDDLE, MIDDLE), (LOW, MIDDLE), (MIDDLE, HIGH)] if self.axis < 2 else [])
+        return pairs + ([(MIDDLE, MIDDLE)] if self.axis < 2 else [])
 
     def _add_span(self, start: int, end: int) -> None:
         """Both ends of a rod; if they are at equal distances from the middle they stay so."""

@@ -238,18 +238,10 @@ class Layout:
     def _along(self, index: int, axis: int) -> Iterator[tuple[str, Argument]]:
         """The keywords of a part in a box along an axis: clearances, size and offset, by its anchors."""
         element = self._element(index, "", axis, ends_of(self.lines[index], "", axis, self._sizes))
-        if len(set(element.anchors)) == 1:
-            yield self._distance(element, element.anchors[0])
-            if element.kind == "interval":
-                yield SIZES[axis], self._slot(index, SIZES[axis], "size", axis, element.high - element.low)
-            return
-        distances = element.low, self.extents[axis] - element.high
-        for word, anchor, distance in zip(AXES[axis], element.anchors, distances, strict=False):
-            if anchor == MIDDLE:  # half of the whole, and as much more or less
-                value = self._slot(index, word, "offset", axis, distance - self.extents[axis] / 2)
-                yield word, Binary("+", Binary("/", Name(SIZES[axis]), 2.0), value)
-            else:
-                yield word, self._slot(index, word, "clearance", axis, distance)
+        for anchor in sorted({*element.anchors}):
+            yield self._distance(element, anchor)
+        if element.kind == "interval" and len({*element.anchors}) == 1:
+            yield SIZES[axis], self._slot(index, SIZES[axis], "size", axis, element.high - element.low)
 
     def _point(self, index: int, key: str) -> Point:
         pairs: list[tuple[str, Value]] = []

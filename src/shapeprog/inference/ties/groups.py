@@ -25,7 +25,7 @@ from shapeprog.space import FloatArray
 def simplified(line: Line, numbers: dict[str, float]) -> Line:
     """The line without keywords of zero, and of points, that change nothing that it draws, given the values of all
     names; a taper with equal radii is a rod."""
-    if isinstance(line, Part) or (isinstance(line, Group) and line.kind in ("divide", "row")):
+    if isinstance(line, Part | Group):
         for keywords in _shorter(line.keywords):
             if _same(line, shorter := replace(line, keywords=keywords), numbers):
                 return simplified(shorter, numbers)

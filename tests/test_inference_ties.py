@@ -581,6 +581,34 @@ def test_faces_are_measured_from_the_side_that_keeps_them_in_contact():
     assert growth == [0, 0, 0, 0, 24, 24]
 
 
+def test_a_stretcher_between_legs_that_lean_is_measured_from_where_it_still_meets_them():
+    program = sp.parse("""
+width, depth, height = 20, 10, 12
+top(top=0, height=1)
+for _ in mirror(x=0):
+    leg(bar(start=at(left=0.5, y=0, bottom=0), end=at(left=5.5, top=1), width=1, depth=1))
+    foot(left=0, width=1, depth=8, bottom=0, height=1)
+stretcher(left=3.5, right=3.5, depth=1, bottom=5.5, height=0.6)
+""")
+    tied = tie(program, evidence_of_program(program))
+    (height,) = (named.value for named in sp.names(tied) if named.name == "height")
+    # Along each axis alone, the box around a leg overlaps the stretcher wherever that is.
+    assert pieces(*union_mesh(unroll(sp.set(tied, height=1.25 * height)))) == 1
+
+
+def test_a_plane_of_a_vertical_mirror_may_be_in_the_middle():
+    program = sp.parse("for i in mirror(up, at=0.1):\n    shelf(box(at=(4, -6, -8), size=(1, 12, 16)))\n"
+                       "side(box(at=(-4.8, -6, -8), size=(10, 12, 1)))\n")  # fmt: skip
+    assert tie(program, evidence_of_program(program)).blocks == 2
+
+
+def test_zeros_are_left_out_of_a_rotation():
+    (line,) = source_of(
+        sp.parse("width, depth, height = 9, 9, 9\nfor _ in rotate(8, y=0):\n    leg(left=0, width=1, depth=1)\n")
+    ).lines[-1:]
+    assert simplified(line, dict.fromkeys(SIZES, 9.0)).keywords == ()
+
+
 def test_parts_move_with_a_shared_number_of_those_that_they_touch():
     text = tied_text("width, depth, height = 12, 8, 24\nseat(top=10, height=1)\n"
                      "for _ in mirror(x=0):\n    leg(left=0, width=1, depth=1, top=10)\n"

@@ -181,7 +181,8 @@ def infer(
             tied=statements == "all", seed=seed, searching=searching, refining=refining, progress=progress,
         )  # fmt: skip
     if statements == "all":
-        final, held = program if snapped is None else named_anew(program), frozenset[int]()
+        final = program if snapped is None else named_anew(program)
+        held = frozenset[int]()
         if libraries:
             final, held = with_calls(final, joined(libraries), coverage)
         if ties:

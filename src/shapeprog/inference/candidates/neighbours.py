@@ -46,7 +46,7 @@ def neighbours(program: Program) -> list[Node]:
             result += [nest((*chain[:-1], drawing)) for drawing in drawings(box)]
             edited = [box, *met(box, parts)]
             edited += [middle for candidate in edited for middle in centred(candidate)]
-            result += [node for candidate in edited for node in redrawn(chain, candidate)]
+            result += [node for candidate in edited[1:] for node in redrawn(chain, candidate)]
             result += [*recounted(chain, -1), *recounted(chain, 1), *_filled(chain)]
     for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
         if box is not None and other_box is not None and _loops(chain) == _loops(other):
@@ -90,7 +90,7 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
 
 
 def recounted(chain: Chain, more: int) -> Iterator[Node]:
-    """A run with so many copies more, at its end or at its beginning."""
+    """A run with so many copies more, at its end or at its beginning, by all statements if its own has no hint."""
     for index, loop in enumerate(chain[:-1]):
         if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2:
             values = float(loop.count + more), *loop.values[1:]

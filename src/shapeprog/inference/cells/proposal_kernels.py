@@ -24,7 +24,7 @@ SLACK = 0.01
 """Margin below the best at which a bound prunes: more than the rounding error of a sum in single precision."""
 
 SIDE = 32
-"""Largest number of cells along a side of a volume: as a limit of the sides of a box it is none."""
+"""Largest number of cells along a side of a volume; a limit of so many cells for the side of a box is no limit."""
 
 
 def families(size: Sequence[int], max_copies: int) -> npt.NDArray[np.int64]:

@@ -32,8 +32,8 @@ REACH = 1.49
 """Largest change of a parameter from a whole number, in cells: rounding and one step lead back."""
 
 STEPS, DRAWN, RATE = 50, 1000, 0.12
-"""Steps by the chamfer distance, points of target and program that each draws, and its size in cells at first, which
-falls to a tenth by a cosine."""
+"""Number of steps by the chamfer distance, points of the target and of the program that each draws, and length of the
+first step in cells; it falls to a tenth by a cosine."""
 
 
 def reconstruct(
@@ -53,8 +53,8 @@ def reconstruct(
     chamfer distance, which is that of the paper.  No further round of the search starts after ``searching``, and no
     further step of fitting after ``refining``.
 
-    There are two of it, in the statements of the paper: with continuous numbers, and with whole ones, each within one
-    of the rounded number of the first.  With them comes a sentence that says why the search stopped.
+    Returns the program with continuous numbers, the same with whole ones, each within one of the rounded number of the
+    first, and a sentence that says why the search stopped.  Both are in the statements of the paper.
     """
     blocks, stopped = search_structure(shape.voxels, settings, seed=seed, deadline=searching, progress=progress)
     snapped = to_program(blocks)

@@ -39,7 +39,7 @@ from shapeprog.library.length import outside
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, Array, FloatArray
 
 AWAY = 4.0 * HALF
-"""A coordinate outside all candidates, for unused samples of a word."""
+"""A coordinate outside all candidates, by which unused samples of a word are known."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,7 @@ class Coverage:
         selected = np.array([self._index[candidate] for candidate in candidates], np.int64)
         covered, interior, samples, sample_price, price = (row[selected] for row in self._rows)
         _, hidden = covers(scene, sorted_by_cell(samples.reshape(-1, 3)), 0.0)
+        # The samples that are used and that no candidate hides by itself.
         exposed = pack(samples[..., 0] != AWAY)[:, 0] & ~hidden.diagonal()
         bits, words = np.concatenate([covered, hidden], 1), -(-len(self.evidence.points) // WORD)
         return CoverageTable(bits, self._weights, words, interior, exposed, sample_price, price)

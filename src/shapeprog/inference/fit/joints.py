@@ -69,12 +69,13 @@ def needs(poses: Poses, joints: Joints) -> tuple[Float[Tensor, " R"], Float[Tens
     cells (C + S,); and their derivatives (C + S, F) by the numbers."""
     scene, slopes = poses
     (first, second), standing = joints.pairs.unbind(1), scene[joints.standing]
-    bearing = torch.cat([first, joints.standing])  # the primitives on which the points are
+    bearing = torch.cat([first, joints.standing])  # the primitives on which the points are: joints, then feet
     normalized = torch.cat([joints.normalized, _inner(standing, _lowest(standing))])
     (parts, rows), (others, other_rows) = _rows_of(scene, bearing), _rows_of(scene, second)
     points = _placed(parts, normalized)
-    into = points[: len(second)]
-    gap = signed_distance(others, into[:, None])[:, 0] + 0.02  # by more than rounding takes away
+    at_joints = points[: len(second)]
+    gap = signed_distance(others, at_joints[:, None])[:, 0]
+    gap = gap + 0.02  # into the other part, by more than rounding takes away
     height = points[len(second) :, 0] - joints.floor
     by_rows, by_other = torch.autograd.grad(gap.sum() + height.sum(), [rows, other_rows])
     by_number = (by_rows[:, None] @ slopes[bearing])[:, 0]

@@ -18,7 +18,7 @@ class Settings:
     sheets: int = 60
     limbs: int = 100
     rods: int = 60
-    pieces: int = 600
+    pieces: int = 600  # slabs, and pieces of all sources
     same: float = 0.25  # difference in position and size below which pieces are the same; components never are
 
     # Selection of boxes that explain the points together

@@ -130,16 +130,17 @@ class Parts:
         """The sides and fronts of a case."""
         plate = self.wide & self.flat & (self.bottom <= self.floor + 0.2 * self.size[UP])
         self.lowest: Mask = plate & (self.bottom <= self.bottom[plate].min(initial=np.inf) + self.near)
-        # Walls and fronts are boards by the way that they face, and slender ones that are wide or high in the whole.
-        deep = ~self.slender | (self.upright & (self.depth >= self.size[DEPTH] / 2))
-        self.wall: Mask = self.board & (self.side == self.thin) & deep
+        # Walls and fronts are boards by the way that they face; slender ones stand, and are half as wide or deep as the
+        # whole.
+        broad_sideways = ~self.slender | (self.upright & (self.depth >= self.size[DEPTH] / 2))
+        self.wall: Mask = self.board & (self.side == self.thin) & broad_sideways
         sides = self.wall & self.outermost & (self.up >= self.size[UP] / 2)
         # Of the whole: its sides reach the floor; it has sides, or a body.
         self.walled = (sides & self.grounded).sum() > 1
         self.cased = np.bool_(sides.sum() > 1 or self.bulky.any())
-        wide = ~self.slender | (self.upright & (self.side >= self.size[SIDE] / 2))
+        broad_frontways = ~self.slender | (self.upright & (self.side >= self.size[SIDE] / 2))
         large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
-        self.front: Mask = self.board & (self.depth == self.thin) & (wide | large)
+        self.front: Mask = self.board & (self.depth == self.thin) & (broad_frontways | large)
         highest = np.where(self.in_front, 0.2, 0.3) * self.size[UP]
         self.plinth: Mask = self.front & self.grounded & (self.up <= highest) & (self.rear < 0)
 

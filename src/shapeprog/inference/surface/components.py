@@ -101,13 +101,14 @@ def solid_sides(mesh: Components, volume: FloatArray) -> IntArray:
     The signed volume, see :func:`enclosed`, is positive if the faces point outwards.  The solid is at least .2 cells
     thick on average: the sign of the volume of a crumpled sheet is random.
     """
+    # NaN, of open components, compares false.
     sign = np.where(2 * np.abs(volume) > 0.2 * mesh.area, np.sign(volume), 0).astype(np.int64)
     return np.repeat(sign, np.diff(mesh.start))
 
 
 def simple_parts(mesh: Components, volume: FloatArray, seen: IntArray) -> FloatArray:
-    """Low and high corners (K, 2, 3) of the boxes of closed components that fill most of their box; ``seen`` has the
-    indices of visible faces, and ``volume`` is what the components enclose."""
+    """Low and high corners (K, 2, 3) of the boxes of closed components with a visible face that fill most of their box;
+    ``seen`` are the indices of visible faces, and ``volume`` is what the components enclose, NaN if they are open."""
     corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
     low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
     simple = np.abs(volume) >= 0.5 * (high - low).prod(1)  # a ball fills .52 of its box

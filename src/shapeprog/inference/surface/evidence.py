@@ -41,8 +41,8 @@ class Evidence:
     surface_outward: Flags  # whether a normal is known to point outwards (Q,), as it bounds a solid
     reach: float  # distance within which one of these points supports a surface
     area: float  # of the surface that the points represent, in proportion to their weights, in square cells
-    free: Flags  # cells (R, R, R) of the grid that are known to be free; only those in the box of the surface count
-    parts: FloatArray  # low and high corners (K, 2, 3) of the boxes of components of simple form, 64 at most
+    free: Flags  # cells (R, R, R) of the grid that are known to be free; without meaning outside the box of the surface
+    parts: FloatArray  # low and high corners (K, 2, 3) of the boxes of the 64 largest simple components; none of scans
     mesh: Components | None = None  # the components of the target, if it is a mesh
 
 

@@ -27,23 +27,19 @@ from shapeprog.space import Array, FloatArray
 
 
 class _AxisAnchors:
-    """The anchors of the K elements of one axis.
+    """The anchors of the K elements of one axis, for a program with all faces measured from the low side.
 
-    Parameters
-    ----------
-    layout, axis
-        The program, with all faces measured from the low side, and the axis.
-    boxes, slopes
-        The boxes of its primitives (N,) from the low corner of the whole, and how these move with its numbers
-        (N, 3, P) and (N, 3, 3, P).
-    pairs
-        Slots of primitives that touch (C,), (C,).
+    It is given with the boxes of its primitives (N,) from the low corner of the whole, how these move with its numbers
+    (N, 3, P) and (N, 3, 3, P), and the slots of pairs of primitives that touch (C,), (C,).
     """
 
     def __init__(
         self, layout: Layout, axis: int, boxes: OrientedBoxes, slopes: OrientedBoxes, pairs: tuple[Array, Array]
     ) -> None:
         self.axis, self.extent, self.pairs, self.boxes = axis, layout.extents[axis], pairs, boxes
+        aslant = np.any(np.sort(np.abs(boxes.edges))[..., 1] > 1e-6, axis=1)  # others separate along the axis alone
+        self.leaning = np.flatnonzero(aslant[pairs[0]] | aslant[pairs[1]])
+        self.gaps = [self._gaps(boxes, exact=exact) for exact in (False, True)]  # at the start
         self.elements = [element for element in layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
@@ -94,6 +90,7 @@ class _AxisAnchors:
             return [(MIDDLE,)] if centred and element.key != "last" else [(LOW,), (MIDDLE,), (HIGH,)]
         if centred:
             return [(LOW, HIGH), (MIDDLE, MIDDLE)]
+        # No part has one face at a side and one at the middle: that is almost never chosen.
         pairs = [(LOW, LOW), (LOW, HIGH), (HIGH, HIGH)]
         return pairs + ([(MIDDLE, MIDDLE)] if self.axis < 2 else [])
 
@@ -109,7 +106,7 @@ class _AxisAnchors:
 
     def _unary(self, element: Element, anchors: Anchors) -> float:
         extent = self.extent
-        cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.off_middle * extent and len(set(anchors)) == 1
+        cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.off_middle * extent
         ends = (element.low, element.high) if len(anchors) > 1 else (element.middle,)
         for end, anchor in zip(ends, anchors, strict=True):
             if anchor == MIDDLE:
@@ -133,7 +130,8 @@ class _AxisAnchors:
         one_sided = [(self.shifts == side / HIGH).all(2).argmax(1) for side in (LOW, HIGH)]
         starts = [self.costs.argmin(1), *one_sided]
         _, best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
-        if self._costs(best[None], exact=True) >= TIES.separated:  # this takes longer
+        # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
+        if len(self.leaning) and self._costs(best[None], exact=True) >= TIES.separated:
             _, best = self._descent(best, exact=True)
         return [choices[k] for choices, k in zip(self.choices, best, strict=True)]
 
@@ -153,7 +151,7 @@ class _AxisAnchors:
         return total, state
 
     def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
-        """The costs (S,) of choices of anchors (S, K); parts are separated if they are along the axis, or exactly."""
+        """The costs (S,) of choices of anchors (S, K); gaps are measured as by :meth:`_gaps`."""
         elements, growth = np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
@@ -171,20 +169,21 @@ class _AxisAnchors:
         lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
         cost += stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
-        before, after = (self._apart(boxes, exact=exact) for boxes in (self.boxes, grown))
-        return cost + TIES.separated * (after > np.maximum(before, 0) + TIES.touch).sum(-1)
+        gaps_before, gaps_after = self.gaps[exact], self._gaps(grown, exact=exact)
+        return cost + TIES.separated * (gaps_after > np.maximum(gaps_before, 0) + TIES.touch).sum(-1)
 
-    def _apart(self, boxes: OrientedBoxes, *, exact: bool) -> FloatArray:
-        """By how much pairs (..., C) of boxes (..., N) that touch are apart, along the axis or in any direction."""
-        first, second = self.pairs
-        if not exact:
-            low, high = _ends(boxes, self.axis)
-            return np.maximum(low[..., first], low[..., second]) - np.minimum(high[..., first], high[..., second])
-        count, pairs = boxes.centre.shape[-2], np.stack(self.pairs)[:, None]
-        states = boxes.centre.size // (3 * count)
-        flat = OrientedBoxes(boxes.centre.reshape(-1, 3), boxes.edges.reshape(-1, 3, 3))
-        first, second = (pairs + count * np.arange(states)[:, None]).reshape(2, -1)
-        return gaps(flat, first, second).reshape(*boxes.centre.shape[:-2], -1)
+    def _gaps(self, boxes: OrientedBoxes, *, exact: bool) -> FloatArray:
+        """Gaps (..., C) between pairs of boxes (..., N) that touched, along the axis; if ``exact``, those of parts that
+        lean in any direction."""
+        (low, high), (first, second) = _ends(boxes, self.axis), self.pairs
+        result: FloatArray = np.maximum(low[..., first], low[..., second])
+        result -= np.minimum(high[..., first], high[..., second])
+        if exact:
+            count, pairs = boxes.centre.shape[-2], np.stack(self.pairs)[:, None, self.leaning]
+            flat = OrientedBoxes(boxes.centre.reshape(-1, 3), boxes.edges.reshape(-1, 3, 3))
+            shifts = np.arange(0, len(flat.centre), count)[:, None]  # of the boxes of each state
+            result[..., self.leaning] = gaps(flat, *(pairs + shifts).reshape(2, -1)).reshape(*low.shape[:-1], -1)
+        return result
 
 
 def _ends(boxes: OrientedBoxes, axis: int) -> FloatArray:

@@ -33,18 +33,10 @@ NOTHING = 1e-7  # factors up to this are zero
 
 
 class Solution(NamedTuple):
-    """Free numbers, and how all numbers follow from them.
+    """Free numbers, and how all numbers follow from them."""
 
-    Parameters
-    ----------
-    factors
-        Of every number (P,) by how much it follows from each free one (P, Z).
-    free
-        Which numbers are free (Z,).
-    """
-
-    factors: FloatArray
-    free: list[int]
+    factors: FloatArray  # of every number by how much it follows from each free one (P, Z)
+    free: list[int]  # which numbers are free (Z,)
 
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:

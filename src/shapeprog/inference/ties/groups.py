@@ -85,7 +85,8 @@ def _sides(line: Line) -> frozenset[tuple[str, Argument]]:
 
 
 def _inside(line: Line, frame: Keywords) -> Line:
-    """What has a box in one with these clearances; it keeps zeros in their place where its size needs a side."""
+    """A part or division as it is written in a box with these clearances: without them, or with 0 where its size needs
+    a side to start from."""
     if not _has_box(line):
         return line
     needed = {word for words in AXES if words.size in dict(line.keywords) for word in words} - {"bottom"}

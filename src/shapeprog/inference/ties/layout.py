@@ -53,8 +53,8 @@ class Layout:
                 case Part() | Group():
                     drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
-        # The parts and loops, in the order of the text, and the roles or else kinds of their parts.  A division stands
-        # for its part, with its role.
+        # The parts and loops, in the order of the text, and their roles, or else kinds.  A division has the role of its
+        # part, for which it stands.
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
         self.words = [line.kind for line in self.lines]
         self.parts: list[int] = []  # the numbers of the lines that are parts
@@ -64,7 +64,7 @@ class Layout:
                 self.words[index] = self.words[self.parts[-1]] = line.role or line.kind
         last = [index + sum(1 for _ in Source((line,)).walk()) - 1 for index, line in enumerate(self.lines)]
         self.loops_around = [[loop for loop in range(n) if n <= last[loop]] for n in range(len(self.lines))]
-        # The lines of cylinders that are nearly as wide as the whole, which then has one diameter.
+        # Cylinders that fill the whole, to which ``_with_radius`` gave no radius: the whole then has one diameter.
         self._filling = [
             index for index, line in enumerate(self.lines)
             if line.kind == "cylinder" and "radius" not in dict(line.keywords)
@@ -170,8 +170,8 @@ class Layout:
         return Group("divide", (*box.items(), ("gap", gap)), (part,), count, "xyz"[axis])
 
     def _with_radius(self, line: Line) -> Line:
-        """An upright round part with a radius in place of a width or depth; one that fills the whole is in its middle,
-        with both."""
+        """An upright round part with a radius in place of a width and depth; a cylinder that fills the whole has these
+        two and no radius, and is in its middle."""
         if not isinstance(line, Part) or line.kind not in ROUND or "start" in dict(line.keywords):
             return line
         width, depth = self._sizes["width"], self._sizes["depth"]

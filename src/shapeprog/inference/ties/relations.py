@@ -195,7 +195,7 @@ def _of_faces(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]
 
 
 def _is_mirrored(layout: Layout, element: Element) -> bool:
-    """Whether a mirror about the middle of the whole copies a part along the axis of its element."""
+    """Whether a mirror about the middle of the whole copies an element, of a part or a loop, along its axis."""
     axis = element.axis
     planes = (layout.elements.get((loop, "plane", axis)) for loop in layout.loops_around[element.line])
     return any(plane is not None and abs(plane.low - layout.extents[axis] / 2) < TIES.within for plane in planes)
@@ -214,8 +214,8 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
     touches = lines[0] != lines[1] and tuple(lines) in touching
     if face.anchor != other.anchor:
         if {face.anchor, other.anchor} == {LOW, HIGH} and single and axis < 2:
-            apart = TIES.contact if "last" in keys else TIES.equal
-            yield Relation(image, TIES.symmetric[axis] if same else apart)
+            trust = TIES.symmetric[axis] if same else TIES.contact if "last" in keys else TIES.equal
+            yield Relation(image, trust)
     elif middles:
         if touches and axis < 2 and any(points) and not single:
             yield Relation(row, TIES.straight)

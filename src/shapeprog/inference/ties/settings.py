@@ -25,7 +25,8 @@ class TieSettings:
 
     # Price of the number that a relation saves, as a multiple of the usual price
     floor: float = 6.0  # a part that ends just above the floor
-    symmetric: tuple[float, float] = (4.0, 2.0)  # equal clearances on the left and right, in front and at the rear
+    # Equal clearances on the left and right, in front and at the rear, above and below
+    symmetric: tuple[float, float, float] = (4.0, 2.0, 2.0)
     contact: float = 2.0  # faces that meet
     straight: float = 1.5  # ends of a rod at equal distances, or on the middle line of a part that it touches
     # Zeros; equal sections, equal sizes of parts of one role, and equal clearances, of a part at a corner, of parts

@@ -49,7 +49,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     numbers = sorted((k, float(value) + 0.0) for k, value in zip(solution.free, free, strict=True))
     shared: dict[str, Value] = {layout.names[k]: value for k, value in numbers if k > 2}
     table = _expressions(layout, solution)
-    sums: dict[Value, str] = {}
+    sums: dict[Value, str] = {}  # equal sums have one name; ``_inlined`` takes back those that are used once
     for name, value in table.items():
         if isinstance(value, Expression) and not isinstance(value, Name):
             table[name] = Name(sums.setdefault(value, f"{name}_sum"))
@@ -70,7 +70,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
 
 
 def _expressions(layout: Layout, solution: Solution) -> dict[str, Value]:
-    """How the numbers follow from the free ones, by name."""
+    """How the numbers follow from the free ones, by name; equal sums are equal expressions, as factors are rounded."""
     table: dict[str, Value] = {}
     for name, factors in zip(layout.names[3:], solution.factors[3:].round(12).tolist(), strict=True):
         terms = zip((layout.names[k] for k in solution.free), factors, strict=True)

@@ -56,8 +56,8 @@ def tie(
     Parameters
     ----------
     program
-        A program of statements in cells, or a placed one; only the numbers that it evaluates to are read, and the whole
-        of a placed one that somebody wrote.
+        A program of statements in cells, or a placed one; only the numbers that it evaluates to are read, and, if they
+        are ``known``, the ``width``, ``depth`` and ``height`` of a placed one.
     evidence
         The target, which limits how far relations may move its parts.
     price

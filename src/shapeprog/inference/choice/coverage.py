@@ -47,8 +47,9 @@ class Prices:
     """Prices subtracted from the value of a program, in shares of the target explained; chosen on val.
 
     Each further block of a call costs as much as a loop; otherwise a box could be written as a drawer whose handle is
-    hidden.  Parts are worth something of their own, as the gaps between drawers have little surface.  So is closeness:
-    among statements that explain the same, the one with the shape of the target wins, a square leg before a round one.
+    hidden.  The reward for parts separates drawers, since the gaps between them have little surface.  The reward for
+    close surface selects, among statements that explain the same points, the one with the shape of the target: a square
+    leg is not drawn as a round one.
     """
 
     unsupported: float = 0.4  # of exposed surface that the target does not support, over the area of the target

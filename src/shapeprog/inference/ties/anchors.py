@@ -37,9 +37,10 @@ class _AxisAnchors:
         self, layout: Layout, axis: int, boxes: OrientedBoxes, slopes: OrientedBoxes, pairs: tuple[Array, Array]
     ) -> None:
         self.axis, self.extent, self.pairs, self.boxes = axis, layout.extents[axis], pairs, boxes
+        low, high = self.ends = _ends(boxes, axis)
         aslant = np.any(np.sort(np.abs(boxes.edges))[..., 1] > 1e-6, axis=1)  # others separate along the axis alone
         self.leaning = np.flatnonzero(aslant[pairs[0]] | aslant[pairs[1]])
-        self.gaps = [self._gaps(boxes, exact=exact) for exact in (False, True)]  # at the start
+        self.gaps = [self._gaps(boxes, self.ends, exact=exact) for exact in (False, True)]  # at the start
         self.elements = [element for element in layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
@@ -64,7 +65,6 @@ class _AxisAnchors:
         self.slopes = OrientedBoxes(slopes.centre @ by_ends, slopes.edges @ by_ends)
         # Mirror images move with the high side of the whole while all coordinates stay.
         self.base = OrientedBoxes(slopes.centre[..., axis] + np.eye(3)[axis] / 2, slopes.edges[..., axis])
-        low, high = self.ends = _ends(boxes, axis)
         self.share, self.long = self.ends / self.extent, high - low >= TIES.spanning * self.extent
         reach, near = TIES.reach * self.extent, (1 - TIES.beyond) * self.extent / 2
         reaches = np.stack([low <= low.min() + reach, high >= high.max() - reach])
@@ -151,7 +151,7 @@ class _AxisAnchors:
         return total, state
 
     def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
-        """The costs (S,) of choices of anchors (S, K); gaps are measured as by :meth:`_gaps`."""
+        """The costs (S,) of choices of anchors (S, K); for ``exact`` see :meth:`_gaps`."""
         elements, growth = np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
@@ -169,13 +169,13 @@ class _AxisAnchors:
         lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
         rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
         cost += stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
-        gaps_before, gaps_after = self.gaps[exact], self._gaps(grown, exact=exact)
+        gaps_before, gaps_after = self.gaps[exact], self._gaps(grown, ends, exact=exact)
         return cost + TIES.separated * (gaps_after > np.maximum(gaps_before, 0) + TIES.touch).sum(-1)
 
-    def _gaps(self, boxes: OrientedBoxes, *, exact: bool) -> FloatArray:
-        """Gaps (..., C) between pairs of boxes (..., N) that touched, along the axis; if ``exact``, those of parts that
-        lean in any direction."""
-        (low, high), (first, second) = _ends(boxes, self.axis), self.pairs
+    def _gaps(self, boxes: OrientedBoxes, ends: FloatArray, *, exact: bool) -> FloatArray:
+        """Gaps (..., C) between pairs of boxes (..., N), whose ends (2, ..., N) are given: along the axis, or, if
+        ``exact``, in any direction for pairs with a part that leans."""
+        (low, high), (first, second) = ends, self.pairs
         result: FloatArray = np.maximum(low[..., first], low[..., second])
         result -= np.minimum(high[..., first], high[..., second])
         if exact:

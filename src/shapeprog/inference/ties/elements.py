@@ -62,8 +62,8 @@ def ends_of(
 ) -> tuple[Any, Any]:
     """The low and high coordinate of an element, see :class:`Element`, from the low side of the whole.
 
-    ``numbers`` are the values of all names, and ``forms`` what they stand for in the result, such as linear forms; by
-    default their values.
+    Expressions are evaluated with the values of all names in ``numbers``.  With ``forms``, the result is computed from
+    these objects in place of the values, for example from linear forms.
     """
     keywords, values = dict(line.keywords), numbers if forms is None else forms
     point = keywords.get(key)

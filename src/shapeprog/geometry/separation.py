@@ -16,22 +16,19 @@ class OrientedBoxes(NamedTuple):
     edges: FloatArray
 
 
-def normals(boxes: OrientedBoxes, first: Array, second: Array) -> FloatArray:
-    """Directions (C, 15, 3) of which one separates a pair of boxes if they are apart: normals of faces, and of pairs of
-    edges, those that are parallel as zeros."""
-    axes = boxes.edges / np.maximum(np.linalg.norm(boxes.edges, axis=2, keepdims=True), 1e-9)
-    crosses = np.cross(axes[first][:, :, None], axes[second][:, None]).reshape(-1, 9, 3)
-    length = np.linalg.norm(crosses, axis=2, keepdims=True)
-    crosses = np.where(length > 1e-6, crosses / np.maximum(length, 1e-9), 0.0)
-    return np.concatenate([axes[first], axes[second], crosses], 1)
-
-
 def gaps(boxes: OrientedBoxes, first: Array, second: Array) -> FloatArray:
-    """Gaps (C,) between pairs of boxes along the direction that separates them most, negative where they overlap."""
-    along = normals(boxes, first, second)
-    away = np.abs(np.einsum("cki,ci->ck", along, boxes.centre[second] - boxes.centre[first]))
-    reach = sum(np.abs(np.einsum("cki,cai->cka", along, boxes.edges[pair])).sum(2) for pair in (first, second))
-    result: FloatArray = np.where(along.any(2), away - reach, -np.inf).max(1)
+    """Gaps (..., C) between pairs of boxes (..., N) along the direction that separates them most, negative where they
+    overlap; that is a normal of a face, or of an edge of each."""
+    axes = boxes.edges / np.maximum(np.linalg.norm(boxes.edges, axis=-1, keepdims=True), 1e-9)
+    axes, others = axes[..., first, :, :], axes[..., second, :, :]
+    crosses = np.cross(axes[..., None, :], others[..., None, :, :])
+    along = np.concatenate([axes, others, crosses.reshape(*crosses.shape[:-3], 9, 3)], -2)  # (..., C, 15, 3)
+    away = (boxes.centre[..., second, :] - boxes.centre[..., first, :])[..., None, :]
+    rows = np.concatenate([away, boxes.edges[..., first, :, :], boxes.edges[..., second, :, :]], -2)
+    extents = np.abs(along @ rows.swapaxes(-1, -2))
+    length = np.sqrt((along**2).sum(-1))  # zero for edges that are parallel
+    gap = (extents[..., 0] - extents[..., 1:].sum(-1)) / np.maximum(length, 1e-9)
+    result: FloatArray = np.where(length > 1e-6, gap, -np.inf).max(-1)
     return result
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import torch
 from jaxtyping import Float
 from torch import Tensor
 
@@ -36,11 +37,9 @@ class _AxisAnchors:
     def __init__(
         self, layout: Layout, axis: int, boxes: OrientedBoxes, slopes: OrientedBoxes, pairs: tuple[Array, Array]
     ) -> None:
-        self.axis, self.extent, self.pairs, self.boxes = axis, layout.extents[axis], pairs, boxes
-        low, high = self.ends = _ends(boxes, axis)
+        self.axis, self.extent, self.pairs = axis, layout.extents[axis], pairs
         aslant = np.any(np.sort(np.abs(boxes.edges))[..., 1] > 1e-6, axis=1)  # others separate along the axis alone
         self.leaning = np.flatnonzero(aslant[pairs[0]] | aslant[pairs[1]])
-        self.gaps = [self._gaps(boxes, self.ends, exact=exact) for exact in (False, True)]  # at the start
         self.elements = [element for element in layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
@@ -62,10 +61,18 @@ class _AxisAnchors:
                 by_ends[layout.index[element.line, AXES[axis].size], 2 * k : 2 * k + 2] = -1, 1
             if element.key != "across":
                 by_ends[layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")], 2 * k] = 1
-        self.slopes = OrientedBoxes(slopes.centre @ by_ends, slopes.edges @ by_ends)
-        # Mirror images move with the high side of the whole while all coordinates stay.
-        self.base = OrientedBoxes(slopes.centre[..., axis] + np.eye(3)[axis] / 2, slopes.edges[..., axis])
-        self.share, self.long = self.ends / self.extent, high - low >= TIES.spanning * self.extent
+        # What the boxes follow from (Q = 2 + 2 K): from one, which gives them at the start, from growth of the whole
+        # while all coordinates stay, as mirror images move with its high side, and from moves of the ends of elements.
+        with_whole = OrientedBoxes(slopes.centre[..., axis] + np.eye(3)[axis] / 2, slopes.edges[..., axis])
+        self.boxes = OrientedBoxes(*(
+            np.concatenate([start[..., None], whole[..., None], slope @ by_ends], -1)
+            for start, whole, slope in zip(boxes, with_whole, slopes, strict=True)
+        ))  # fmt: skip
+        self.along = self.boxes.centre[:, axis].copy(), self.boxes.edges[:, :, axis].copy()
+        start = np.eye(2 * count + 2)[:, :1]
+        self.ends, self.gaps = self._ends(start), [self._gaps(start, exact=exact) for exact in (False, True)]
+        low, high = self.ends[..., 0]
+        self.long = high - low >= TIES.spanning * self.extent
         reach, near = TIES.reach * self.extent, (1 - TIES.beyond) * self.extent / 2
         reaches = np.stack([low <= low.min() + reach, high >= high.max() - reach])
         beyond = np.stack([high <= near, low >= self.extent - near])
@@ -137,15 +144,19 @@ class _AxisAnchors:
 
     def _descent(self, state: Array, *, exact: bool = False) -> tuple[float, Array]:
         """The cost and state (K,) from which no change of an element is cheaper."""
-        total = float(self._costs(state[None], exact=exact)[0])
+        total, (count, most) = float(self._costs(state[None], exact=exact)[0]), self.costs.shape
         for _ in range(8):
-            before = state
-            for k, choices in enumerate(self.choices):
-                trials = np.repeat(state[None], len(choices), 0)
-                trials[:, k] = np.arange(len(choices))
-                costs = self._costs(trials, exact=exact)
-                if costs.min() < total - 1e-9:
-                    state, total = trials[costs.argmin()], float(costs.min())
+            before, k = state, 0
+            while k < count:  # from here on the next element that is cheaper with another choice
+                trials = np.tile(state, (count - k, most, 1))
+                trials[np.arange(count - k), :, np.arange(k, count)] = np.arange(most)
+                costs = self._costs(trials.reshape(-1, count), exact=exact).reshape(-1, most)
+                cheaper = costs.min(1) < total - 1e-9
+                if not cheaper.any():
+                    break
+                first = int(cheaper.argmax())
+                state, total = trials[first, costs[first].argmin()], float(costs[first].min())
+                k += first + 1
             if state is before:
                 break
         return total, state
@@ -158,52 +169,43 @@ class _AxisAnchors:
             cost += penalty * (states[:, start] != states[:, end])
         for last, first in self.rows.items():  # a row gives a side or the middle of its last copy
             shifts[:, last] -= shifts[:, last, :1] * (shifts[:, first, 1:] - shifts[:, first, :1])
-        flat = shifts.reshape(len(states), -1)
-        moves = (np.moveaxis(slopes @ flat.T, -1, 0) for slopes in self.slopes)
-        parts = zip(self.boxes, self.base, moves, strict=True)
-        grown = OrientedBoxes(*(start + growth * (base + move) for start, base, move in parts))
-        ends = _ends(grown, self.axis)
-        low, high = (ends - self.ends[:, None]) / growth
+        amounts = np.full((2 * states.shape[1] + 2, len(states)), growth)
+        amounts[0] = 1
+        amounts[2:] *= shifts.reshape(len(states), -1).T
+        low, high = (self._ends(amounts) - self.ends) / growth
         # A face near a side moves with it, or keeps its proportion.
-        stays = np.abs(low - np.clip(low, -0.13, np.maximum(self.share[0], 0) + 0.13)) > 1e-9
-        lags = np.abs(high - np.clip(high, np.minimum(self.share[1], 1) - 0.13, 1.13)) > 1e-9
-        rigid = self.long & (high - low < self.share[1] - self.share[0] - 0.5)
-        cost += stays @ self.weights[0] + lags @ self.weights[1] + TIES.rigid * rigid.sum(1)
-        gaps_before, gaps_after = self.gaps[exact], self._gaps(grown, ends, exact=exact)
-        return cost + TIES.separated * (gaps_after > np.maximum(gaps_before, 0) + TIES.touch).sum(-1)
+        low_share, high_share = self.ends / self.extent
+        stays = np.abs(low - np.clip(low, -0.13, np.maximum(low_share, 0) + 0.13)) > 1e-9
+        lags = np.abs(high - np.clip(high, np.minimum(high_share, 1) - 0.13, 1.13)) > 1e-9
+        rigid = self.long[:, None] & (high - low < high_share - low_share - 0.5)
+        cost += self.weights[0] @ stays + self.weights[1] @ lags + TIES.rigid * rigid.sum(0)
+        apart = self._gaps(amounts, exact=exact) > np.maximum(self.gaps[exact], 0) + TIES.touch
+        return cost + TIES.separated * apart.sum(0)
 
-    def _gaps(self, boxes: OrientedBoxes, ends: FloatArray, *, exact: bool) -> FloatArray:
-        """Gaps (..., C) between pairs of boxes (..., N), whose ends (2, ..., N) are given: along the axis, or, if
-        ``exact``, in any direction for pairs with a part that leans."""
-        (low, high), (first, second) = ends, self.pairs
-        result: FloatArray = np.maximum(low[..., first], low[..., second])
-        result -= np.minimum(high[..., first], high[..., second])
+    def _ends(self, amounts: FloatArray) -> FloatArray:
+        """The low and high ends (2, N, S) of boxes along the axis, for amounts (Q, S) of what they follow from."""
+        centre, edges = (part @ amounts for part in self.along)
+        reach = np.abs(edges).sum(1)
+        return np.stack([centre - reach, centre + reach])
+
+    def _gaps(self, amounts: FloatArray, *, exact: bool) -> FloatArray:
+        """Gaps (C, S) between pairs of boxes, for such amounts: along the axis, or, if ``exact``, in any direction for
+        pairs with a part that leans."""
+        (low, high), (first, second) = self._ends(amounts), self.pairs
+        result: FloatArray = np.maximum(low[first], low[second]) - np.minimum(high[first], high[second])
         if exact:
-            count, pairs = boxes.centre.shape[-2], np.stack(self.pairs)[:, None, self.leaning]
-            flat = OrientedBoxes(boxes.centre.reshape(-1, 3), boxes.edges.reshape(-1, 3, 3))
-            shifts = np.arange(0, len(flat.centre), count)[:, None]  # of the boxes of each state
-            result[..., self.leaning] = gaps(flat, *(pairs + shifts).reshape(2, -1)).reshape(*low.shape[:-1], -1)
+            boxes = OrientedBoxes(*(np.moveaxis(part @ amounts, -1, 0) for part in self.boxes))
+            result[self.leaning] = gaps(boxes, first[self.leaning], second[self.leaning]).T
         return result
-
-
-def _ends(boxes: OrientedBoxes, axis: int) -> FloatArray:
-    """The low and high ends (2, ...) of boxes along an axis."""
-    reach = np.abs(boxes.edges[..., axis]).sum(-1)
-    return np.stack([boxes.centre[..., axis] - reach, boxes.centre[..., axis] + reach])
-
-
-def _boxes(scene: Scene, change: Float[Tensor, "N 16"]) -> OrientedBoxes:
-    """The boxes of primitives where sizes, centres and rotations change."""
-    size, centre, rotation = change.split([SIZES, 3, 9], 1)
-    rotation = scene.rotation + rotation.reshape(-1, 3, 3)
-    return boxes_of(replace(scene, size=scene.size + size, centre=scene.centre + centre, rotation=rotation))
 
 
 def _slopes(scene: Scene, rows: Float[Tensor, "N 16 P"]) -> OrientedBoxes:
     """How the boxes of primitives follow from numbers: their centres (N, 3, P) and edges (N, 3, 3, P)."""
-    ways = [(_boxes(scene, 1e-3 * row), _boxes(scene, -1e-3 * row)) for row in rows.unbind(-1)]
-    changes = [[(after - before) / 2e-3 for after, before in zip(*way, strict=True)] for way in ways]
-    return OrientedBoxes(*(np.stack(change, -1) for change in zip(*changes, strict=True)))
+    steps = 1e-3 * torch.stack([rows, -rows]).permute(0, 3, 1, 2)  # forward and back (2, P, N, 16)
+    size, centre, rotation = steps.split([SIZES, 3, 9], -1)
+    rotation = scene.rotation + rotation.unflatten(-1, (3, 3))
+    boxes = boxes_of(replace(scene, size=scene.size + size, centre=scene.centre + centre, rotation=rotation))
+    return OrientedBoxes(*(np.moveaxis((after - before) / 2e-3, 0, -1) for after, before in boxes))
 
 
 def anchors_of(layout: Layout) -> dict[Key, Anchors]:

@@ -83,5 +83,5 @@ def ends_of(
 
 def boxes_of(scene: Scene) -> OrientedBoxes:
     """The boxes around the primitives of a scene (N,), for a person in front: to the right, to the rear, upwards."""
-    edges = scene.rotation.transpose(1, 2) * scene.bounds[..., None]
+    edges = scene.rotation.transpose(-1, -2) * scene.bounds[..., None]
     return OrientedBoxes(*(vectors.numpy()[..., ::-1] * [-1, 1, 1] for vectors in (scene.centre, edges)))

@@ -52,7 +52,7 @@ class Tunable:
         self.program = program
         nodes = list(program.walk())
         code = encode(program, dtype=torch.float64)
-        self._start = code.parameters
+        self._code = code
         # Of every number (F) the index of its node in the order of the text, and its slot there.
         self.moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
         # The same program with the number of every value, from 1, in its place; 0 where it stays.
@@ -64,13 +64,16 @@ class Tunable:
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in self.moving], dtype=torch.float64)
         self.low = torch.tensor([least(quantity) for quantity in quantities], dtype=torch.float64)
         self._once = Plan(code)
-        repeated = (part.expand(2 * len(self.moving), *part.shape) for part in (code.ids, code.parameters))
-        self._plan = Plan(Code(*repeated))
+        self._plan = self._plan_of(2 * len(self.moving))
         self.scale = self._scales(nodes, self._once.scene(code.parameters))
 
     def scene(self, values: Float[Tensor, " F"]) -> Scene:
         """The primitives (N,) where the numbers are these."""
         return self._once.scene(self._filled(values))
+
+    def scenes(self, values: Float[Tensor, "S F"]) -> Scene:
+        """The primitives (S, N) where the numbers are each of these."""
+        return self._plan_of(len(values)).scene(self._filled(values))
 
     def poses(self, values: Float[Tensor, " F"]) -> Poses:
         """Primitives and slopes where the numbers are these, by central differences in one batch of programs."""
@@ -95,9 +98,13 @@ class Tunable:
         """Which numbers are of a kind."""
         return torch.tensor([item == kind for item in self.kinds], dtype=torch.bool)
 
+    def _plan_of(self, count: int) -> Plan:
+        """The plan of so many such programs in one batch."""
+        return Plan(Code(*(part.expand(count, *part.shape) for part in (self._code.ids, self._code.parameters))))
+
     def _filled(self, values: Float[Tensor, "*batch F"]) -> Float[Tensor, "*batch K J slots"]:
         padded = torch.nn.functional.pad(values, (0, 1))  # at index -1
-        return torch.where(self._index >= 0, padded[..., self._index], self._start)
+        return torch.where(self._index >= 0, padded[..., self._index], self._code.parameters)
 
     def _scales(self, nodes: Sequence[Node], scene: Scene) -> Float[Tensor, " F"]:
         """How many cells the surface moves for one unit of each number, at most: 1 for places and lengths, more for

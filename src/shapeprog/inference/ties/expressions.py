@@ -87,23 +87,25 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
 def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[Solution, FloatArray]:
     """The numbers (P,) of a program as expressions of other free ones, so that fewer parts are separated when a shared
     one changes; and the values of these (Z,)."""
-    contacts, slots, free = _Contacts(layout, numbers), layout.slots, solution.free
+    contacts, free = _Contacts(layout, numbers), solution.free
     factors, values = solution.factors.copy(), numbers[free]
-    for z, k in enumerate(free):
-        if slots[k].kind in ("extent", "angle") or np.count_nonzero(factors[:, z]) < 2:
-            continue
-        cost, lost = contacts.cost(factors[:, z], values[z])
-        for _ in range(TIES.operations if cost else 0):
-            best = None
-            for y, way in product(_carriable(factors, layout, lost, z), (1.0, -1.0)):
-                less, separated = contacts.cost(factors[:, z] + way * factors[:, y], values[z], cost)
-                if less < cost:
-                    best, cost, lost = (y, way), less, separated
-            if best is None:
+    shared = [
+        z for z, k in enumerate(free)
+        if layout.slots[k].kind not in ("extent", "angle") and np.count_nonzero(factors[:, z]) > 1
+    ]  # fmt: skip
+    changes = contacts.after((factors * values).T[shared])
+    for n, z in enumerate(shared):
+        for _ in range(TIES.operations):
+            cost, lost = changes[n]
+            ways = [*product(_carriable(factors, layout, lost, z), (1.0, -1.0))] if cost else []
+            others = contacts.after(np.array([(factors[:, z] + way * factors[:, y]) * values[z] for y, way in ways]))
+            best = min(range(len(ways)), key=lambda index: others[index][0], default=0)
+            if not ways or others[best][0] >= cost:
                 break
-            y, way = best
+            y, way = ways[best]
             factors[:, z] += way * factors[:, y]
             values[y] -= way * values[z]
+            changes = contacts.after((factors * values).T[shared])
     return Solution(factors, free), values
 
 
@@ -130,21 +132,25 @@ class _Contacts:
         scene = layout.scene(numbers)
         self.line = np.array(layout.parts)[scene.block.numpy()]
         self.first, self.second = touching(boxes_of(scene), TIES.touch)
-        self.pieces = self._pieces(np.ones(len(self.first), bool))
+        self.pieces = self._pieces(np.ones((1, len(self.first)), bool))
 
-    def cost(self, along: FloatArray, value: float, least: float = np.inf) -> tuple[float, set[int]]:
-        """How many pieces more there are when a number of this value changes, counted up to the least so far; and the
-        lines that lose contacts."""
-        total, lost = 0.0, set[int]()
-        for factor in TIES.changes:
-            if total < least:
-                scene = self.layout.scene(self.numbers + (factor - 1) * value * along)
-                kept = gaps(boxes_of(scene), self.first, self.second) < TIES.touch
-                total += self._pieces(kept) - self.pieces
-                lost |= {*self.line[[*self.first[~kept], *self.second[~kept]]].tolist()}
-        return total, lost
+    def after(self, parts: FloatArray) -> list[tuple[int, set[int]]]:
+        """For parts (S, P) of the numbers, each of which a name multiplies: how many more pieces there are when that
+        changes, and the lines that lose contacts."""
+        if not len(parts):
+            return []
+        changes = np.multiply.outer(parts, np.subtract(TIES.changes, 1)).swapaxes(1, 2)  # (S, 2, P)
+        boxes = boxes_of(self.layout.scenes(self.numbers + changes.reshape(-1, changes.shape[-1])))
+        kept = gaps(boxes, self.first, self.second) < TIES.touch
+        more = (self._pieces(kept) - self.pieces).reshape(len(parts), -1).sum(1).tolist()
+        lines = self.line[np.stack([self.first, self.second])]
+        lost = np.any(~kept.reshape(*changes.shape[:2], -1), 1)
+        return [(count, {*lines[:, of].ravel().tolist()}) for count, of in zip(more, lost, strict=True)]
 
-    def _pieces(self, kept: Array) -> int:
-        """The number of pieces that these contacts leave."""
-        count, pairs = len(self.line), (self.first[kept], self.second[kept])
-        return int(connected_components(coo_array((np.ones(len(pairs[0])), pairs), (count, count)), directed=False)[0])
+    def _pieces(self, kept: Array) -> Array:
+        """The numbers (S,) of pieces that contacts (S, C) leave."""
+        count, (scene, pair) = len(self.line), np.nonzero(kept)
+        pairs = [count * scene + slots[pair] for slots in (self.first, self.second)]
+        graph = coo_array((np.ones(len(pair)), pairs), (count * len(kept),) * 2)
+        _, labels = connected_components(graph, directed=False)
+        return np.array([len({*row}) for row in labels.reshape(-1, count).tolist()])

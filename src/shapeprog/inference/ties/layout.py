@@ -100,12 +100,16 @@ class Layout:
         self.low: FloatArray = self.tunable.low.numpy() - self._offset
 
     def values(self, numbers: FloatArray) -> Tensor:
-        """The numbers of the statements in cells (F,) where those of the text are these (P,)."""
-        return torch.from_numpy(self.jacobian @ numbers + self._offset)
+        """The numbers of the statements in cells (..., F) where those of the text are these (..., P)."""
+        return torch.from_numpy(numbers @ self.jacobian.T + self._offset)
 
     def scene(self, numbers: FloatArray) -> Scene:
         """The primitives (N,)."""
         return self.tunable.scene(self.values(numbers))
+
+    def scenes(self, numbers: FloatArray) -> Scene:
+        """The primitives (S, N) for each of some numbers (S, P)."""
+        return self.tunable.scenes(self.values(numbers))
 
     def poses(self, numbers: FloatArray) -> Poses:
         """The primitives, and their slopes (N, 16, P) by the numbers."""

@@ -76,17 +76,15 @@ class Misfit:
         return numbers
 
 
-def closeness(scene: Scene, evidence: Evidence, seed: int) -> float:
+def closeness(scene: Scene, surface: cKDTree, seed: int) -> float:
     """The F-score of the surfaces of a scene and of a target: how much of each lies near the other.
 
     The squared misfit assumes that points are assigned to the right parts.  For thin parts and sheets they may not be;
     the misfit can then fall while a part leaves its surface.  The points of both are the same for the same seed.
     """
-    surface = evidence.surface
-    reach = TIES.near * float(np.linalg.norm(np.ptp(surface, 0)))
-    points = torch.from_numpy(surface[np.random.default_rng(seed).integers(0, len(surface), TIES.points)])
+    reach = TIES.near * float(np.linalg.norm(surface.maxes - surface.mins))
+    points = torch.from_numpy(surface.data[np.random.default_rng(seed).integers(0, surface.n, TIES.points)])
     recall = float((signed_distance(scene, points).abs() <= reach).double().mean())
     sample = sample_surface(scene, TIES.points, torch.Generator().manual_seed(seed))
-    away = cKDTree(surface).query(sample.points.numpy(), distance_upper_bound=reach)[0]
-    precision = float(np.isfinite(away).mean())
+    precision = float(np.isfinite(surface.query(sample.points.numpy(), distance_upper_bound=reach)[0]).mean())
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0

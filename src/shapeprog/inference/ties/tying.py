@@ -13,6 +13,7 @@ from collections.abc import Collection
 
 import numpy as np
 import torch
+from scipy.spatial import cKDTree
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
@@ -82,14 +83,15 @@ def tie(
         assert tied.source is not None
         ties = _Ties(tied.source, evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
-        before = 0.0 if known else closeness(unroll(plain), evidence, seed)
+        surface = cKDTree(evidence.surface, balanced_tree=False)  # faster to build
+        before = 0.0 if known else closeness(unroll(plain), surface, seed)
         least = math.inf
         for attempt in range(TIES.attempts):
             try:
                 offered = ties.tied(price / TIES.cheaper**attempt)
             except Fault:  # relations left a part without length
                 continue
-            lost = 0.0 if known else before - closeness(unroll(offered), evidence, seed)
+            lost = 0.0 if known else before - closeness(unroll(offered), surface, seed)
             if lost < least:
                 tied, least = offered, lost
             if lost <= TIES.lost:

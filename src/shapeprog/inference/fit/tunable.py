@@ -64,7 +64,7 @@ class Tunable:
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in self.moving], dtype=torch.float64)
         self.low = torch.tensor([least(quantity) for quantity in quantities], dtype=torch.float64)
         self._once = Plan(code)
-        self._plan = self._plan_of(2 * len(self.moving))
+        self._plan = self._plan_of(2 * len(self.moving) + 1)
         self.scale = self._scales(nodes, self._once.scene(code.parameters))
 
     def scene(self, values: Float[Tensor, " F"]) -> Scene:
@@ -78,10 +78,10 @@ class Tunable:
     def poses(self, values: Float[Tensor, " F"]) -> Poses:
         """Primitives and slopes where the numbers are these, by central differences in one batch of programs."""
         steps = STEP * torch.eye(len(values), dtype=values.dtype)
-        scenes = self._plan.scene(self._filled(values + torch.cat([steps, -steps])))
+        scenes = self._plan.scene(self._filled(values + torch.cat([steps, -steps, torch.zeros_like(steps[:1])])))
         rows = torch.cat([scenes.size, scenes.centre, scenes.rotation.flatten(-2)], -1)
-        upper, lower = rows.unflatten(0, (2, len(values)))
-        return Poses(self.scene(values), ((upper - lower) / (2 * STEP)).permute(1, 2, 0).contiguous())
+        upper, lower = rows[:-1].unflatten(0, (2, len(values)))
+        return Poses(scenes[-1], ((upper - lower) / (2 * STEP)).permute(1, 2, 0).contiguous())
 
     def settled(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers, rounded."""

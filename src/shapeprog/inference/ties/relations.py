@@ -8,7 +8,7 @@ in fit is below that of the number they save are selected.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, combinations
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -32,38 +32,32 @@ class Relation(NamedTuple):
     limit: float = TIES.within  # largest deviation, in cells or degrees, with which it is considered
 
 
-class _Face(NamedTuple):
-    """A low or high end of an element, or its middle."""
+class _Face:
+    """A low or high end of an element, or its middle.
 
-    element: Element
-    row: FloatArray  # how its coordinate from the low side of the whole follows from the numbers (P,)
-    at: float  # that coordinate
-    facing: int  # whether it faces the low or the high side, -1 or 1; 0 for the middle
+    It is given with how its coordinate from the low side of the whole follows from the numbers (P,), with that
+    coordinate, and with whether it faces the low or the high side, -1 or 1; 0 for the middle.
+    """
 
-    @property
-    def anchor(self) -> int:
-        """From where it is measured: from the low side if it does not move when the whole grows, and so on."""
-        return round(2 * self.row[self.element.axis])
-
-    @property
-    def single(self) -> bool:
-        """Whether it is one number, the distance from its anchor."""
-        return np.count_nonzero(self.row[3:]) == 1
+    def __init__(self, element: Element, row: FloatArray, at: float, facing: int) -> None:
+        self.element, self.row, self.at, self.facing = element, row, at, facing
+        # From where it is measured: from the low side if it does not move when the whole grows, and so on.
+        self.anchor = round(2 * row[element.axis])
+        self.single = np.count_nonzero(row[3:]) == 1  # whether it is one number, the distance from its anchor
 
 
 def relations(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
     """Distinct relations that nearly hold where the numbers are these (P,), each with its highest trust; ``touching``
     are the pairs of lines, the smaller first, whose parts touch."""
+    found = [*_of_faces(layout, numbers, touching), *_of_numbers(layout, numbers)]
+    rows = np.array([relation.row for relation in found]).reshape(-1, len(numbers))
+    largest, limits = np.abs(rows).max(1, initial=0), np.array([relation.limit for relation in found])
     best: dict[bytes, Relation] = {}
-    for relation in chain(_of_faces(layout, numbers, touching), _of_numbers(layout, numbers)):
-        used = np.flatnonzero(relation.row)
-        if not len(used):
-            continue
-        row = relation.row / relation.row[used[0]]
-        if abs(float(row @ numbers)) <= relation.limit * float(np.abs(row).max()):
-            key = np.round(row, 6).tobytes()
-            known = best.get(key, relation)
-            best[key] = Relation(row, max(relation.trust, known.trust), relation.meetings | known.meetings)
+    for k in np.flatnonzero((largest > 0) & (np.abs(rows @ numbers) <= limits * largest)).tolist():
+        row, relation = rows[k] / rows[k, rows[k].nonzero()[0][0]], found[k]
+        key = np.round(row, 6).tobytes()
+        known = best.get(key, relation)
+        best[key] = Relation(row, max(relation.trust, known.trust), relation.meetings | known.meetings)
     return list(best.values())
 
 
@@ -187,11 +181,11 @@ def _of_faces(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]
     for axis, extent in enumerate(numbers[:3]):
         along = [face for face in faces if face.element.axis == axis]
         mirrored = [face for face in along if _is_mirrored(layout, face.element)]
-        along += [_Face(element, unit[axis] - row, extent - at, -facing) for element, row, at, facing in mirrored]
-        for face, other in combinations(along, 2):
-            off = min(abs(face.at - other.at), abs(face.at + other.at - extent))
-            if off <= 2 * TIES.within:  # no relation allows more
-                yield from _pair(layout, face, other, touching)
+        along += [_Face(face.element, unit[axis] - face.row, extent - face.at, -face.facing) for face in mirrored]
+        at = np.array([face.at for face in along])
+        off = np.minimum(np.abs(at - at[:, None]), np.abs(at + at[:, None] - extent))
+        for first, second in np.argwhere(np.triu(off <= 2 * TIES.within, 1)).tolist():  # no relation allows more
+            yield from _pair(layout, along[first], along[second], touching)
 
 
 def _is_mirrored(layout: Layout, element: Element) -> bool:

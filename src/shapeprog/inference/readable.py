@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 
 import torch
 from jaxtyping import Float
@@ -26,6 +27,8 @@ from shapeprog.language.unroll import Plan
 
 TOLERANCES = (0.015, 0.004, 0.001)
 """How far a face may move, in cells; the smaller ones where parts come apart, and for programs in cells."""
+
+ROUNDING = 1e-6  # cells that float32 may add to that
 
 CELLS = "cells"
 """The word for lengths in cells of the grid."""
@@ -57,33 +60,29 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
         return exact
     loose = len(floating(program))
     for tolerance in TOLERANCES[unit is None :]:
-        result = _rounded(exact, tolerance)
-        if len(floating(result)) <= loose:
-            return result
+        with suppress(ShapeProgError):  # something has no size any more
+            result = _rounded(exact, tolerance)
+            if len(floating(result)) <= loose:
+                return result
     return exact
 
 
 def _rounded(program: Program, tolerance: float) -> Program:
     lengths, with_numbers = literal_lengths(program)
-    code = encode(program, dtype=torch.float64)
-    plan = Plan(code)  # that of all these programs
-    numbers, before = [*lengths], _faces(plan.scene(code.parameters))
-    per_cell = 1.0 if program.unit is None else program.unit.per_cell
-    for step in (0.5, 1.0):  # shares of the tolerance: numbers that are nearly round go first
-        for index, number in enumerate(lengths):
-            for tried in _rounder(number, step * tolerance * per_cell):
-                if tried == numbers[index]:
+    farthest = tolerance * (1.0 if program.unit is None else program.unit.per_cell)
+    changed = [with_numbers([*lengths[:k], length + farthest, *lengths[k + 1 :]]) for k, length in enumerate(lengths)]
+    code = encode([program, *changed], dtype=torch.float64)
+    faces = _faces(Plan(code).scene(code.parameters))
+    slopes = (faces[1:] - faces[0]) / farthest  # near enough linear for such small changes
+    numbers, moved = [*lengths], torch.zeros_like(faces[0])
+    for share in (0.5, 1.0):  # of the tolerance: numbers that are nearly round go first
+        for k, length in enumerate(lengths):
+            for tried in _rounder(length, share * farthest):
+                then = moved + (tried - numbers[k]) * slopes[k]
+                if float(then.abs().max()) <= share * tolerance + ROUNDING:
+                    numbers[k], moved = tried, then
                     break
-                try:
-                    result = with_numbers([*numbers[:index], tried, *numbers[index + 1 :]])
-                    scene = plan.scene(encode(result, dtype=torch.float64).parameters)
-                    close = float((_faces(scene) - before).abs().max()) <= step * tolerance
-                except ShapeProgError:  # something has no size any more
-                    continue
-                if close:
-                    program, numbers[index] = result, tried
-                    break
-    return program
+    return with_numbers(numbers)
 
 
 def _rounder(number: float, farthest: float) -> Iterator[float]:
@@ -99,6 +98,6 @@ def _rounder(number: float, farthest: float) -> Iterator[float]:
                 yield tried
 
 
-def _faces(scene: Scene) -> Float[Tensor, "N 2 3"]:
+def _faces(scene: Scene) -> Float[Tensor, "*batch N 2 3"]:
     """The lowest and highest corners of the boxes around the primitives of a scene, along the axes of the grid."""
-    return torch.stack([scene.centre - scene.reach, scene.centre + scene.reach], 1)
+    return torch.stack([scene.centre - scene.reach, scene.centre + scene.reach], -2)

@@ -26,8 +26,9 @@ def simplified(line: Line, numbers: dict[str, float]) -> Line:
     """The line without keywords of zero, and of points, that change nothing that it draws, given the values of all
     names; a taper with equal radii is a rod."""
     if isinstance(line, Part | Group):
+        drawn = _drawn(line, numbers)
         for keywords in _shorter(line.keywords):
-            if _same(line, shorter := replace(line, keywords=keywords), numbers):
+            if _same(drawn, _drawn(shorter := replace(line, keywords=keywords), numbers)):
                 return simplified(shorter, numbers)
         radius = dict(line.keywords).get("radius")
         if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
@@ -58,6 +59,7 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
     lines = merged_lines(lines)
     while True:
         sides = {line: _sides(line) for line in lines if not isinstance(line, Group) or line.kind != "inside"}
+        drawn = {line: _drawn(line, numbers) for line, own in sides.items() if own}
         frames = {one & other for one, other in combinations(sides.values(), 2)} - {frozenset()}
         best, saved = lines, 0
         for frame in sorted((tuple(sorted(frame, key=lambda side: BOX.index(side[0]))) for frame in frames), key=str):
@@ -65,7 +67,7 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
             inner = dict(zip(sides, moved, strict=True))
             members = [
                 line for line in sides
-                if line != inner[line] and _same(line, Group("inside", frame, (inner[line],)), numbers)
+                if line != inner[line] and _same(drawn[line], _drawn(Group("inside", frame, (inner[line],)), numbers))
             ]  # fmt: skip
             box = Group("inside", frame, tuple(inner[line] for line in members))
             words = sum(map(_words, members)) - _words(box) - 2
@@ -102,18 +104,19 @@ def _words(line: Line) -> int:
     return sum(sum(cost(pairs)) for pairs in keywords)
 
 
-def _same(line: Line, other: Line, numbers: dict[str, float]) -> bool:
-    """Whether two lines draw the same statements whatever the numbers are: tried with irregular ones."""
+def _drawn(line: Line, numbers: dict[str, float]) -> FloatArray:
+    """The values of all statements in cells that a line draws for some irregular numbers; not a number if it cannot."""
     random = np.random.default_rng(0)
     changed = {name: (value or 0.1) * random.uniform(0.9, 1.1) for name, value in numbers.items()}
     if "diameter" in changed:
         changed |= dict.fromkeys(SIZES[:2], changed["diameter"])
-    drawn: list[FloatArray] = []  # the values of all statements in cells
-    for each in (line, other):
-        source = placed_source((Assignment(tuple(numbers.items())), each))
-        try:
-            nodes = Program(symbolic(source, changed)).walk()
-        except ShapeProgError:
-            return False
-        drawn.append(np.array([float(value) for node in nodes for value in node.values]))
-    return drawn[0].shape == drawn[1].shape and np.allclose(drawn[0], drawn[1])
+    try:
+        nodes = Program(symbolic(placed_source((Assignment(tuple(numbers.items())), line)), changed)).walk()
+    except ShapeProgError:
+        return np.array([np.nan])
+    return np.array([float(value) for node in nodes for value in node.values])
+
+
+def _same(drawn: FloatArray, other: FloatArray) -> bool:
+    """Whether two lines draw the same whatever the numbers are."""
+    return drawn.shape == other.shape and np.allclose(drawn, other)

@@ -120,7 +120,6 @@ class _Ties:
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
         self.joined = np.sort(np.array(layout.parts)[blocks[apart]], 1)  # the lines (C, 2) of each joint
         self.touching = set(map(tuple, self.joined.tolist()))
-        self.loose = self._loose(layout.numbers)
 
     def tied(self, price: float) -> Program:
         """The program tied at a price of a number, in the unit of the misfit.
@@ -133,7 +132,8 @@ class _Ties:
             solution, values = self._solved(price)
             digits = (DEGREES if slots[k].kind == "angle" else self.decimals for k in solution.free)
             free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
-            loose = self._loose(solution.factors @ free) - self.loose
+            loose = self._loose(solution.factors @ free)
+            loose = loose and loose - self._loose(self.layout.numbers)  # those that were so before do not count
             if not loose:
                 break
             self.misfit.together *= np.where(np.isin(self.joined, [*loose]).any(1), TIES.heavier, 1.0)

@@ -99,8 +99,8 @@ def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[So
             cost, lost = changes[n]
             ways = [*product(_carriable(factors, layout, lost, z), (1.0, -1.0))] if cost else []
             others = contacts.after(np.array([(factors[:, z] + way * factors[:, y]) * values[z] for y, way in ways]))
-            best = min(range(len(ways)), key=lambda index: others[index][0], default=0)
-            if not ways or others[best][0] >= cost:
+            least, best = min(((more, index) for index, (more, _) in enumerate(others)), default=(cost, 0))
+            if least >= cost:
                 break
             y, way = ways[best]
             factors[:, z] += way * factors[:, y]
@@ -140,7 +140,8 @@ class _Contacts:
         if not len(parts):
             return []
         changes = np.multiply.outer(parts, np.subtract(TIES.changes, 1)).swapaxes(1, 2)  # (S, 2, P)
-        boxes = boxes_of(self.layout.scenes(self.numbers + changes.reshape(-1, changes.shape[-1])))
+        changed = self.layout.values(self.numbers + changes.reshape(-1, changes.shape[-1]))
+        boxes = boxes_of(self.layout.tunable.scenes(changed))
         kept = gaps(boxes, self.first, self.second) < TIES.touch
         more = (self._pieces(kept) - self.pieces).reshape(len(parts), -1).sum(1).tolist()
         lines = self.line[np.stack([self.first, self.second])]

@@ -107,10 +107,6 @@ class Layout:
         """The primitives (N,)."""
         return self.tunable.scene(self.values(numbers))
 
-    def scenes(self, numbers: FloatArray) -> Scene:
-        """The primitives (S, N) for each of some numbers (S, P)."""
-        return self.tunable.scenes(self.values(numbers))
-
     def poses(self, numbers: FloatArray) -> Poses:
         """The primitives, and their slopes (N, 16, P) by the numbers."""
         poses = self.tunable.poses(self.values(numbers))

@@ -223,6 +223,6 @@ def anchors_of(layout: Layout) -> dict[Key, Anchors]:
             result[element.line, element.key, axis] = anchors
         for last, first in solver.rows.items():
             copy, original = solver.elements[last], solver.elements[first]
-            if abs(copy.low - original.low) < TIES.still:  # a row that does not run along this axis
+            if abs(copy.low - original.low) < TIES.within:  # a row that does not run along this axis
                 result[copy.line, copy.key, axis] = result[original.line, original.key, axis][:1]
     return result

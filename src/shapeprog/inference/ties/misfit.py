@@ -13,16 +13,14 @@ from shapeprog.inference.fit.joints import Joints, moved, needs
 from shapeprog.inference.fit.residuals import Target, of_target
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.ties.elements import Kind
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.relations import HOLDS
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.space import FloatArray
 
-PRIOR = {
-    "clearance": 2e-4, "offset": 2e-4, "length": 2e-4, "size": 1e-3, "radius": 1e-3, "edge": 1e-3, "gap": 1e-3,
-    "angle": 1e-3, "extent": 1e-2,
-}  # fmt: skip
-"""Weights of a squared move from the start, by kind: numbers that nothing determines do not change."""
+PRIOR: dict[Kind, float] = {"clearance": 2e-4, "offset": 2e-4, "length": 2e-4, "extent": 1e-2}
+"""Weights of a squared move from the start, by kind, else 1e-3: numbers that nothing determines do not change."""
 
 
 class Misfit:
@@ -37,7 +35,7 @@ class Misfit:
         self.generator = torch.Generator().manual_seed(seed)
         scale = np.maximum(layout.tunable.scale.numpy() @ np.abs(layout.jacobian), 1e-3)
         self.reach: FloatArray = np.maximum(scale, 1.0)  # cells that the surface moves for one unit of every number
-        prior = np.maximum([PRIOR[slot.kind] for slot in layout.slots], minimum)
+        prior = np.maximum([PRIOR.get(slot.kind, 1e-3) for slot in layout.slots], minimum)
         angles = np.array([slot.kind == "angle" for slot in layout.slots])
         self.together: FloatArray = np.full(len(joints.pairs), TIES.together)  # weights of the squared gaps (C,)
         self.prior: FloatArray = np.where(angles, prior * scale**2, prior)

@@ -62,7 +62,6 @@ class TieSettings:
     growth: float = 0.25  # by which the whole grows to see what is separated
     off_middle: float = 0.02  # by which the middle of a part may miss that of the whole
     fills: float = 0.9  # from this on a round part fills the whole
-    still: float = 0.3  # cells between the first and last copy of a row up to which it does not run along an axis
 
     # Numbers that carry parts
     changes: tuple[float, ...] = (0.7, 1.4)  # what a name is multiplied by to see which parts it separates

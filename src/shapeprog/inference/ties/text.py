@@ -48,11 +48,13 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     header.append(Assignment(tuple(zip(SIZES, extents, strict=True))))
     numbers = sorted((k, float(value) + 0.0) for k, value in zip(solution.free, free, strict=True))
     shared: dict[str, Value] = {layout.names[k]: value for k, value in numbers if k > 2}
-    table = _expressions(layout, solution)
+    table: dict[str, Value] = {}  # how the numbers follow from the free ones
     sums: dict[Value, str] = {}  # equal sums have one name; ``_inlined`` takes back those that are used once
-    for name, value in table.items():
-        if isinstance(value, Expression) and not isinstance(value, Name):
-            table[name] = Name(sums.setdefault(value, f"{name}_sum"))
+    free_names = [layout.names[k] for k in solution.free]
+    for name, factors in zip(layout.names[3:], solution.factors[3:].round(12).tolist(), strict=True):
+        value = Linear(0.0, tuple(term for term in zip(free_names, factors, strict=True) if term[1])).written()
+        is_sum = isinstance(value, Expression) and not isinstance(value, Name)
+        table[name] = Name(sums.setdefault(value, f"{name}_sum")) if is_sum else value
     shared |= {name: value for value, name in sums.items()}
     body, shared = _inlined(_changed(layout.body, table), shared)
     known = Source((*header, Assignment(tuple(shared.items())))).evaluated_numbers()
@@ -67,15 +69,6 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     assert scale is not None
     floor = scale.floor + (layout.extents[2] - float(known["height"])) * scale.cells_per_unit / 2
     return Source((*header, *_changed(body, final)), layout.source.unit, replace(scale, floor=floor))
-
-
-def _expressions(layout: Layout, solution: Solution) -> dict[str, Value]:
-    """How the numbers follow from the free ones, by name; equal sums are equal expressions, as factors are rounded."""
-    table: dict[str, Value] = {}
-    for name, factors in zip(layout.names[3:], solution.factors[3:].round(12).tolist(), strict=True):
-        terms = zip((layout.names[k] for k in solution.free), factors, strict=True)
-        table[name] = Linear(0.0, tuple(term for term in terms if term[1])).written()
-    return table
 
 
 def _inlined(lines: tuple[Line, ...], shared: Mapping[str, Value]) -> tuple[tuple[Line, ...], dict[str, Value]]:

@@ -5,6 +5,7 @@ Each takes a :class:`Box` and yields none, one or several lists of values; what 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -16,6 +17,8 @@ STRAIGHT = 0.9986  # cosine from which a direction counts as that of an axis: th
 ROUND = 0.75  # least ratio of the sides of a section that may be round
 SOFT = 0.5  # least radius in cells of an edge that differs visibly from a sharp one
 STEEPEST = 45.0  # degrees up to which a board is tilted
+
+AXES = np.eye(3)
 
 BULGE = (0.15, 0.9)
 """Height of an arc as a share of the half length of its chord, from and to which a flat box may hold one."""
@@ -46,14 +49,14 @@ def tilted_board(box: Box) -> Iterator[list[float]]:
     across = int(np.abs(box.rotation[SIDE]).argmax())
     sides = [axis for axis in range(3) if axis != across]
     rising = max(sides, key=lambda axis: abs(box.rotation[UP, axis]))
-    flat = sides[0] if rising == sides[1] else sides[1]
+    flat = 3 - across - rising
     along = box.rotation[:, rising] * np.sign(box.rotation[UP, rising])
     tilt = np.degrees(np.arctan2(along[DEPTH], along[UP]))
     if abs(box.rotation[SIDE, across]) < STRAIGHT or not 180 / np.pi * 0.05 < abs(tilt) <= STEEPEST:
         return
     half = np.array([box.half[rising], box.half[flat], box.half[across]])
     back = np.array([-along[DEPTH], along[UP], 0.0])
-    corner = box.centre - half[0] * along - half[1] * back - half[2] * np.eye(3)[SIDE]
+    corner = box.centre - half[0] * along - half[1] * back - half[2] * AXES[SIDE]
     yield [*corner, *(2 * half), tilt]
 
 
@@ -71,7 +74,7 @@ def bar_along(box: Box, long: int) -> list[float]:
     first, second = (_leaned(along, main, axis) for axis in range(3) if axis != main)
     sides = [axis for axis in range(3) if axis != long]
     nearest = max(sides, key=lambda axis: abs(box.rotation[:, axis] @ first))
-    far = sides[0] if nearest == sides[1] else sides[1]
+    far = 3 - long - nearest
     x, y = box.rotation[:, nearest] @ first, box.rotation[:, nearest] @ second
     turn = np.degrees(np.arctan2(y * np.sign(x), abs(x))) * (-1 if main == DEPTH else 1)
     return [*start, *end, 2 * box.half[nearest], 2 * box.half[far], float(turn)]
@@ -129,18 +132,17 @@ def rounded(box: Box) -> Iterator[list[float]]:
 
 def _leaned(along: FloatArray, main: int, axis: int) -> FloatArray:
     """A grid axis after the least rotation that brings the ``main`` one to a unit vector: as bars are leaned."""
-    return np.eye(3)[axis] - along[axis] / (1 + along[main]) * (np.eye(3)[main] + along)
+    return AXES[axis] - along[axis] / (1 + along[main]) * (AXES[main] + along)
 
 
 def _ends(box: Box, axis: int) -> tuple[FloatArray, FloatArray]:
     """Both ends of the middle line along an axis: the lower first, else that in front, else that on the left."""
     along = box.half[axis] * box.rotation[:, axis]
-    rounded = np.round(along, 3)
-    sign = next((np.sign(value) for value in rounded if value), 1.0)
+    sign = next((math.copysign(1, value) for value in np.round(along, 3).tolist() if value), 1.0)
     return box.centre - sign * along, box.centre + sign * along
 
 
 def _radius(box: Box, axis: int) -> float:
     """Radius of the section across an axis; none where it is not nearly square."""
-    small, large = sorted(np.delete(box.half, axis))
+    small, large = sorted(box.half[other] for other in range(3) if other != axis)
     return float((small + large) / 2) if small >= ROUND * large else 0.0

@@ -188,7 +188,7 @@ class Language:
             raise DeclarationError(message, hint)
         if not declared.ships:
             _try(declared)
-        self._by_id[declared.id] = declared
+        self._by_id = dict(sorted({**self._by_id, declared.id: declared}.items()))
         self._by_name[declared.name] = declared
         return declared
 
@@ -274,7 +274,7 @@ class Language:
         return self._by_name[key] if isinstance(key, str) else self._by_id[key]
 
     def __iter__(self) -> Iterator[Statement]:
-        return iter(sorted(self._by_id.values(), key=lambda declared: declared.id))
+        return iter(self._by_id.values())
 
     @property
     def names(self) -> list[str]:

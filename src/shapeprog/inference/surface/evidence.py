@@ -77,7 +77,9 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     weights = np.where(front | back, 1.0, 0.1)  # what cannot be seen from outside counts little
     facing, oriented = _turned_outward(facing, front, back)
     area = float(mesh.area.sum())
-    coarse: Flags = np.any(barrier.reshape((SURFACE.free, SURFACE.looking // SURFACE.free) * 3), (1, 3, 5))
+    coarse: Flags = barrier.reshape((SURFACE.free, SURFACE.looking // SURFACE.free) * 3)
+    for axis in range(1, 4):  # faster than all at once
+        coarse = np.any(coarse, axis)
     return Evidence(
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
         surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
@@ -188,11 +190,11 @@ def _free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
     ``through``, both ways: parts of a shape may be missing from its scan."""
     scale = len(barrier) / RESOLUTION
     low, high = ((end + HALF) * scale for end in (surface.min(0), surface.max(0)))
-    starts = np.argwhere(np.ones_like(barrier)) + 0.5
-    within = ((starts >= low) & (starts <= high)).all(1)
+    middle = np.arange(len(barrier))[:, None] + 0.5
     steps, minimum = (directions()[::2], 4) if through else (directions(), 2)
-    free = np.zeros_like(barrier)
-    free[within.reshape(free.shape)] = looking(barrier, starts[within], steps, minimum, through=through)
+    within, free = np.zeros_like(barrier), np.zeros_like(barrier)
+    within[np.ix_(*((middle >= low) & (middle <= high)).T)] = True
+    free[within] = looking(barrier, np.argwhere(within).astype(np.float64) + 0.5, steps, minimum, through=through)
     return free
 
 
@@ -220,7 +222,7 @@ def doubt_of_furniture(evidence: Evidence) -> str:
     place = (points - low) / extents
     plan = np.minimum((place[:, 1:] * RESOLUTION).astype(int), RESOLUTION - 1) @ [RESOLUTION, 1]
     level = (normals[:, UP] > math.cos(math.radians(15))) & (place[:, UP] > 0.1)
-    covered = len(np.unique(plan[level])) / len(np.unique(plan))
+    covered = np.count_nonzero(np.bincount(plan[level])) / np.count_nonzero(np.bincount(plan))
     along = float((normals.max(1) > math.cos(math.radians(10))).mean())
     # Less is true of mugs, bottles, cars and figures, and of 2 % of furniture (val), all of it wire or shells.
     if covered >= 0.35 or along >= 0.45:

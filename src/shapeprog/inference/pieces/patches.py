@@ -31,8 +31,8 @@ def planar_patches(cloud: Cloud) -> Boxes:
     grow_patches(
         cloud.points, cloud.normals, cloud.neighbours, order, cosine, cloud.tolerance, SETTINGS.patch_points, label
     )
-    largest = np.argsort(-np.bincount(label[label >= 0]), kind="stable")[: SETTINGS.patches]
-    sets = [cloud.points[label == patch] for patch in largest]
+    by_patch = np.split(cloud.points[np.argsort(label, kind="stable")], np.cumsum(np.bincount(label + 1))[:-1])[1:]
+    sets = sorted(by_patch, key=len, reverse=True)[: SETTINGS.patches]
     if not sets:
         return join([])
     boxes = boxes_around(sets, upright(principal_axes(sets)[1][:, :, 2]), 2 * cloud.spacing)
@@ -61,10 +61,10 @@ def _bars(sets: list[FloatArray], patches: Boxes, side: float) -> Iterator[Boxes
         grid[tuple(np.minimum(at.astype(int), shape - 1).T)] = True
         if grid.mean() > SETTINGS.full or shape.max() < 6:
             continue
-        for corners in _bars_of(grid):
-            ends = np.array(corners) / shape * extent - half[:2]
-            centre, half_bar = middle + axes[:, :2] @ ends.mean(0), np.append((ends[1] - ends[0]) / 2, 0)
-            yield Boxes(centre[None], axes[None], half_bar[None])
+        ends = np.reshape(_bars_of(grid), (-1, 2, 2)) / shape * extent - half[:2]
+        centre = middle + (axes[:, :2] @ ends.mean(1)[..., None])[..., 0]
+        half_bars = np.pad((ends[:, 1] - ends[:, 0]) / 2, ((0, 0), (0, 1)))
+        yield Boxes(centre, np.broadcast_to(axes, (len(ends), 3, 3)), half_bars)
 
 
 def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[int, int]]]:
@@ -73,8 +73,8 @@ def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[i
     for axis in range(2):
         runs, _ = label_regions(grid, np.swapaxes([[0, 0, 0], [1, 1, 1], [0, 0, 0]], axis, 1))
         length = np.bincount(runs.reshape(-1))[runs] * grid
-        for share in SETTINGS.bar_runs:
-            regions, _ = label_regions(length >= max(share * grid.shape[axis], 3))
+        for least in dict.fromkeys(np.maximum(np.ceil(np.array(SETTINGS.bar_runs) * grid.shape[axis]), 3).tolist()):
+            regions, _ = label_regions(length >= least)
             for number, place in enumerate(find_objects(regions), 1):
                 rows, columns = place
                 region = regions[place] == number
@@ -85,14 +85,13 @@ def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[i
 
 def slabs(patches: Boxes) -> Boxes:
     """Distinct boxes between pairs of patches: intersection and bounds of both rectangles, and each of them."""
-    normal = patches.rotation[:, :, 2]
-    distance = np.einsum("ijk,ik->ij", patches.centre[None] - patches.centre[:, None], normal)
+    normal, area = patches.rotation[:, :, 2], patches.half[:, :2].prod(1)
     parallel = np.abs(normal @ normal.T) > np.cos(np.radians(SETTINGS.parallel))
-    area = patches.half[:, :2].prod(1)
-    larger = area[:, None] >= area
-    thick = np.abs(distance)
-    i, j = np.nonzero(parallel & larger & (thick >= SETTINGS.thickness[0]) & (thick <= SETTINGS.thickness[1]))
-    corner = patches.corners()[j] - patches.centre[i][:, None]
+    i, j = np.nonzero(parallel & (area[:, None] >= area))
+    depth = ((patches.centre[j] - patches.centre[i]) * normal[i]).sum(1)
+    thick = (np.abs(depth) >= SETTINGS.thickness[0]) & (np.abs(depth) <= SETTINGS.thickness[1])
+    i, j, depth = i[thick], j[thick], depth[thick]
+    corner = patches.corners()[j, ::2] - patches.centre[i][:, None]  # patches have four
     flat = np.einsum("nck,nka->nca", corner, patches.rotation[i][:, :, :2])
     low, high = flat.min(1), flat.max(1)
     half = patches.half[i, :2]
@@ -101,7 +100,7 @@ def slabs(patches: Boxes) -> Boxes:
     keep = shared >= SETTINGS.shared * np.minimum(4 * half.prod(1), (high - low).prod(1))
     spans = np.array([inner, (np.minimum(low, -half), np.maximum(high, half)), (-half, half), (low, high)])
     low, high = np.concatenate(spans[:, :, keep], 1)
-    i, depth = np.tile(i[keep], len(spans)), np.tile(distance[i, j][keep], len(spans))
+    i, depth = np.tile(i[keep], len(spans)), np.tile(depth[keep], len(spans))
     frame, deep = patches.rotation[i], depth[:, None]
     centre = patches.centre[i] + np.einsum("nij,nj->ni", frame, np.concatenate([(low + high) / 2, deep / 2], 1))
     boxes = Boxes(centre, frame, np.concatenate([(high - low) / 2, np.abs(deep) / 2], 1))

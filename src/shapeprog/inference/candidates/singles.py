@@ -20,8 +20,7 @@ from shapeprog.geometry.distance import distance_and_slopes
 from shapeprog.inference.candidates.drawings import drawings, is_unhinted, scene_of, starts
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import STEP, THINNEST, least
-from shapeprog.inference.pieces.pieces import Pieces
-from shapeprog.inference.pieces.point_kernels import near_boxes
+from shapeprog.inference.pieces.pieces import Pieces, near
 from shapeprog.language.hints import Box
 from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Draw, Node, Program
@@ -107,9 +106,8 @@ def misfits(draws: Sequence[Draw], points: Float[Tensor, "B P 3"], normals: Floa
 def _target(pieces: Pieces) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B P 3"], Array]:
     """Points just above the surface near the faces of B pieces, normals, and the indices (B,) of these pieces."""
     step = max(1, len(pieces.cloud.points) // SETTINGS.surface_points)
-    points, normals = (np.ascontiguousarray(array[::step]) for array in (pieces.cloud.points, pieces.cloud.normals))
-    mask = np.zeros((len(pieces.boxes.half), len(points)), np.bool_)
-    near_boxes(points, *map(np.ascontiguousarray, pieces.boxes), SETTINGS.near, mask, np.zeros(len(mask)))
+    points, normals = pieces.cloud.points[::step], pieces.cloud.normals[::step]
+    mask, _ = near(pieces.boxes, points, SETTINGS.near)
     indices = np.flatnonzero(mask.any(1))
     share, selected = np.arange(SETTINGS.points) / SETTINGS.points, np.empty((len(indices), SETTINGS.points), np.int64)
     for row, members in enumerate(map(np.flatnonzero, mask[indices])):

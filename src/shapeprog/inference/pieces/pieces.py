@@ -10,6 +10,7 @@ from itertools import compress, pairwise
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.geometry.mesh import triangle_normals
@@ -23,6 +24,7 @@ from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, project
 from shapeprog.inference.surface.components import Components, IntArray
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.surface.settings import SURFACE
+from shapeprog.space import UP, FloatArray
 
 
 class Source(IntEnum):
@@ -53,10 +55,8 @@ class Support:
 
     def __init__(self, cloud: Cloud, boxes: Boxes) -> None:
         every = -(-len(cloud.points) // SETTINGS.cover_points)
-        points, fill = np.ascontiguousarray(cloud.points[::every]), np.zeros(len(boxes.half))
-        self.explained = np.zeros((len(fill), len(points)), np.bool_)
         distance = max(SETTINGS.cover_distance, 2 * cloud.noise)
-        near_boxes(points, *map(np.ascontiguousarray, boxes), distance, self.explained, fill)
+        self.explained, fill = near(boxes, cloud.points[::every], distance)
         self.filled = fill >= SETTINGS.cover_filled
         area = 8 * (boxes.half * np.roll(boxes.half, -1, 1)).sum(1)
         self.price = SETTINGS.cover_price * area * (1 - fill) / (cloud.spacing**2 * every)
@@ -74,6 +74,16 @@ class Support:
             counts -= self.explained[:, remaining & self.explained[best]].sum(1)
             remaining &= ~self.explained[best]
         return np.array(selected, np.int64)
+
+
+def near(boxes: Boxes, points: FloatArray, distance: float) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+    """Which points (N, 3) are near the surface of each box (B, N), and the share of it near which points lie (B,)."""
+    rise = 1.001 * (np.abs(boxes.rotation[:, UP]) * (boxes.half + distance)).sum(1)
+    order = np.argsort(points[:, UP])  # most points are above or below a box
+    between = np.searchsorted(points[order, UP], boxes.centre[:, UP] + [-rise, rise])
+    explained, fill = np.zeros((len(rise), len(points)), np.bool_), np.zeros(len(rise))
+    near_boxes(points[order], order, *between, *map(np.ascontiguousarray, boxes), distance, explained, fill)
+    return explained, fill
 
 
 def find_pieces(evidence: Evidence) -> Pieces:

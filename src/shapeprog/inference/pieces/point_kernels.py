@@ -56,12 +56,13 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size
             patches += 1
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8, b1[:, ::1], f8[::1])")
-def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
+@kernel("void(f8[:, ::1], i8[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8, b1[:, ::1], f8[::1])")
+def near_boxes(points, name, start, end, centre, rotation, half, tolerance, explained, fill):
     """Which points are near the surface of each box, and the share of the box's surface near which points lie.
 
-    Points (N, 3) are near within ``tolerance``.  The surface is divided into squares of about two cells, at most eight
-    along a side.  The outputs ``explained`` (B, N) and ``fill`` (B,) are initially zero.
+    Points (N, 3) are near within ``tolerance``; those that may be near box b are from ``start[b]`` to ``end[b] - 1``.
+    The surface is divided into squares of about two cells, at most eight along a side.  The outputs ``explained``
+    (B, N), where point k has the column ``name[k]``, and ``fill`` (B,) are initially zero.
     """
     covered, at = np.empty((6, 8, 8), np.bool_), np.empty(3)
     count, square = np.empty(3, np.int64), np.empty(3, np.int64)
@@ -71,7 +72,7 @@ def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
         covered[:] = False
         for axis in range(3):
             count[axis] = min(max(int(np.ceil(size[axis])), 1), 8)
-        for k in range(len(points)):
+        for k in range(start[b], end[b]):
             x, y, z = points[k, 0] - centre[b, 0], points[k, 1] - centre[b, 1], points[k, 2] - centre[b, 2]
             if x * x + y * y + z * z > reach:  # most points are outside this ball
                 continue
@@ -86,7 +87,7 @@ def near_boxes(points, centre, rotation, half, tolerance, explained, fill):
                 for axis in range(3):
                     if size[axis] - abs(at[axis]) <= tolerance:
                         face = 2 * axis + (1 if at[axis] > 0 else 0)
-                        explained[b, k] = covered[face, square[(axis + 1) % 3], square[(axis + 2) % 3]] = True
+                        explained[b, name[k]] = covered[face, square[(axis + 1) % 3], square[(axis + 2) % 3]] = True
         total, filled = 0.0, 0.0
         for face in range(6):
             i, j = (face // 2 + 1) % 3, (face // 2 + 2) % 3

@@ -206,19 +206,20 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
     mirrored = ((left,), side), ((front,), depth), ((left, front), four)
     result = [nest((*loops, nodes[k])) for loops, index in mirrored for k in index]
     plain = np.flatnonzero(supported & [not isinstance(node, Loop) for node in nodes])
-    for axis, count in itertools.product(_axes(scene), SETTINGS.turns):
+    for axis in _axes(scene):
         around = (points[plain, :, DEPTH] - axis[0]) + 1j * (points[plain, :, SIDE] - axis[1])
-        turn = np.angle(around * around.mean(1, keepdims=True).conj())
-        index = plain[(np.abs(turn) < np.pi / count).mean(1) >= SETTINGS.sector]
-        index = np.setdiff1d(index, [*side, *depth]) if count == 4 else index  # mirrors follow changes of the width
-        step = 2 * np.pi / count
-        index = kept(index, _turned(points[index, ::6], axis, step))  # few points settle most candidates
-        for copy in range(1, count):
-            index = kept(index, _turned(points[index], axis, copy * step))
-        between = kept(index, _turned(points[index], axis, step / 2))
-        index = np.setdiff1d(index, between)  # there are no copies on a round surface
-        name, values = ("rotate_about", (count, 360 / count, *axis)) if axis.any() else ("rotate", (count, 1))
-        result += [Loop(name, loop_values(*values), (nodes[k],)) for k in index.tolist()]
+        turn = np.abs(np.angle(around * around.mean(1, keepdims=True).conj()))
+        for count in SETTINGS.turns:
+            step = 2 * np.pi / count
+            index = plain[(turn < step / 2).mean(1) >= SETTINGS.sector]
+            index = np.setdiff1d(index, [*side, *depth]) if count == 4 else index  # mirrors follow changes of the width
+            index = kept(index, _turned(points[index, ::6], axis, step))  # few points settle most candidates
+            # There are no copies on a round surface.
+            index = np.setdiff1d(index, kept(index, _turned(points[index], axis, step / 2)))
+            for copy in range(1, count):
+                index = kept(index, _turned(points[index], axis, copy * step))
+            name, values = ("rotate_about", (count, 360 / count, *axis)) if axis.any() else ("rotate", (count, 1))
+            result += [Loop(name, loop_values(*values), (nodes[k],)) for k in index.tolist()]
     return result
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.candidates.drawings import canonical_side, simplest
+from shapeprog.inference.candidates.drawings import canonical_side, simplest, solid_boxes
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
 from shapeprog.inference.candidates.neighbours import neighbours, recounted, residual_candidates, shorter
 from shapeprog.inference.candidates.singles import single_candidates
@@ -125,9 +125,10 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     the error of the coverage; and a row loses a copy that costs nothing, such as a shelf inside the top.
     """
     options = [(index, node, 0.005) for index, node in enumerate(start.body)]
+    solids = solid_boxes(adjusted.draws)
     for index, (block, chain) in enumerate(zip(adjusted.body, adjusted.chains, strict=True)):
         options += [(index, node, -0.001) for node in shorter(block)]
-        options += [(index, node, -0.00001) for node in recounted(chain, -1)]
+        options += [(index, node, -0.00001) for node in recounted(chain, solids[index], -1)]
     nodes = [*adjusted.body, *(node for _, node, _ in options)]
     table, selected = _table(nodes, coverage), tuple(range(len(start.body)))
     text = [(price, Program((node,)).size) for price, node in zip(table.prices, nodes, strict=True)]

@@ -35,10 +35,12 @@ def neighbours(program: Program) -> list[Node]:
     chains = program.chains
     if not chains:
         return []
-    draws = [chain[-1] for chain in chains]
-    boxes = [solids[0] if len(solids) == 1 else None for solids in solid_boxes(draws)]
-    block_boxes = solid_boxes(program.body)
-    result: list[Node] = [*repeated([*draws, *program.body]), *rows(block_boxes)]
+    # What each block draws with all of its loops, without the outermost, and so on.
+    inner = iter(solid_boxes([nest(chain[index:]) for chain in chains for index in range(len(chain))]))
+    drawn = [[next(inner) for _ in chain] for chain in chains]
+    block_boxes = [parts[0] for parts in drawn]
+    boxes = [parts[-1][0] if len(parts[-1]) == 1 else None for parts in drawn]
+    result: list[Node] = [*repeated([*program.draws, *program.body]), *rows(block_boxes)]
     for index, (chain, box) in enumerate(zip(chains, boxes, strict=True)):
         result += [*_unlooped(chain), *_mirrored(chain)]
         if box is not None:
@@ -47,7 +49,9 @@ def neighbours(program: Program) -> list[Node]:
             edited = [box, *met(box, parts)]
             edited += [middle for candidate in edited for middle in centred(candidate)]
             result += [node for candidate in edited[1:] for node in redrawn(chain, candidate)]
-            result += [*recounted(chain, -1), *recounted(chain, 1), *_filled(chain)]
+            result += [*recounted(chain, [box], -1), *recounted(chain, [box], 1)]
+            for level, solids in enumerate(drawn[index][:-1]):  # a board instead of a run
+                result += [nest((*chain[:level], drawing)) for drawing in drawings(_around(solids[0], solids))]
     for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
         if box is not None and other_box is not None and _loops(chain) == _loops(other):
             for around in _merged(box, other_box):
@@ -89,23 +93,16 @@ def _mirrored(chain: Chain) -> Iterator[Node]:
                 yield nest((mirror(axis), *chain[1:]))
 
 
-def recounted(chain: Chain, more: int) -> Iterator[Node]:
-    """A run with so many copies more, at its end or at its beginning, by all statements if its own has no hint."""
+def recounted(chain: Chain, boxes: Sequence[Box], more: int) -> Iterator[Node]:
+    """A run with so many copies more, at its end or at its beginning, by all statements if its own has no hint;
+    ``boxes`` are those around its solids."""
     for index, loop in enumerate(chain[:-1]):
         if isinstance(loop, Loop) and loop.name == "translate" and loop.count + more >= 2:
             values = float(loop.count + more), *loop.values[1:]
             changed = (*chain[:index], replace(loop, values=values), *chain[index + 1 :])
             yield nest(changed)
-            for box in solid_boxes([chain[-1]])[0][:1]:
+            for box in boxes[:1]:
                 yield from redrawn(changed, box._replace(centre=box.centre - more * np.array(values[1:])))
-
-
-def _filled(chain: Chain) -> Iterator[Node]:
-    """A board instead of a run."""
-    for index in range(len(chain) - 1):
-        (parts,) = solid_boxes([nest(chain[index:])])
-        for drawing in drawings(_around(parts[0], parts)):
-            yield nest((*chain[:index], drawing))
 
 
 def _merged(first: Box, second: Box) -> Iterator[Box]:

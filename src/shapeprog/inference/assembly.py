@@ -69,7 +69,7 @@ def assemble(
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     program = connected(_unharmed(adjusted, start, coverage), coverage)
-    program = tidy(Program(tuple(canonical_side(simplest(node)) for node in program.body)))
+    program = tidy(canonical_side(simplest(program)))
     program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)
     table = _table([*program.body, *others[:1]], coverage)

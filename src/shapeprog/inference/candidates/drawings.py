@@ -9,6 +9,7 @@ from itertools import product
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
@@ -17,7 +18,7 @@ from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import Parameter
 from shapeprog.language.printer import numbers_written
-from shapeprog.language.program import Draw, Loop, Node, Program, nest
+from shapeprog.language.program import Draw, Node, Program, nest
 from shapeprog.language.statement import END, Statement, language
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
@@ -83,50 +84,68 @@ def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
     ]
 
 
-def simplest(node: Node) -> Node:
-    """The same block drawn by the statement with the fewest numbers, of those with a hint that draw the same solid.
+def single_boxes(nodes: Sequence[Node]) -> list[Box | None]:
+    """The box around the solid of each block, none where there are several."""
+    return [solids[0] if len(solids) == 1 else None for solids in solid_boxes(nodes)]
 
-    The block is unchanged if its statement has a pivot or draws several solids.
+
+def simplest(program: Program) -> Program:
+    """The program, of one node for each block, drawn by the statements with the fewest numbers, of those with a hint
+    that draw the same solid.
+
+    Blocks are unchanged if their statement has a pivot or draws several solids.
     """
-    if isinstance(node, Loop):
-        return Loop(node.name, node.values, tuple(simplest(inner) for inner in node.body))
-    (boxes,) = solid_boxes([node])
-    if len(boxes) != 1 or language()[node.name].pivot is not None:
-        return node
-    same = _drawing_the_same(drawings(boxes[0]), node, boxes[0], np.ones(3))
-    if not same or is_unhinted(language()[node.name]):  # those of the paper are written as a solid with a role
-        same.append(node)
-    return min(same, key=numbers_written)
+    draws, boxes = program.draws, single_boxes(program.draws)
+    turned = [language()[draw.name].pivot is not None for draw in draws]
+    options = [[] if box is None or pivot else drawings(box) for box, pivot in zip(boxes, turned, strict=True)]
+    plain = []
+    for draw, same in zip(draws, _drawing_the_same(draws, options, np.ones((len(draws), 3))), strict=True):
+        if not same or is_unhinted(language()[draw.name]):  # those of the paper are written as a solid with a role
+            same.append(draw)
+        plain.append(min(same, key=numbers_written))
+    return _redrawn(program, plain)
 
 
-def canonical_side(node: Node) -> Node:
-    """The same block, where parts mirrored about the middle of the shape are drawn on the left and at the rear.
+def canonical_side(program: Program) -> Program:
+    """The program, of one node for each block, where parts mirrored about the middle of the shape are drawn on the left
+    and at the rear.
 
-    The block is unchanged if its statement cannot draw the mirror image, or if it has loops other than mirrors.
+    Blocks are unchanged if their statement cannot draw the mirror image, or if they have loops other than mirrors.
     """
-    ((*loops, drawing),) = Program((node,)).chains
-    assert isinstance(drawing, Draw)
-    (boxes,) = solid_boxes([drawing])
-    if len(boxes) != 1 or any(loop.name != "mirror" for loop in loops):
-        return node
-    (box,), signs = boxes, np.ones(3)
-    for _, axis, offset in (loop.values for loop in loops):
-        if offset == 0 and box.centre[int(axis)] < 0:
-            signs[int(axis)] = -1
-    if (signs > 0).all():
-        return node
-    turn = signs[:, None] * box.rotation * [1, 1, signs.prod()]  # a box is its own image along its last axis
-    image = Box(signs * box.centre, turn, box.half)
-    same = _drawing_the_same(drawings(image, drawing.name), drawing, image, signs)
-    return nest((*loops, same[0])) if same else node
+    draws, boxes = program.draws, single_boxes(program.draws)
+    options, signs = [list[Draw]() for _ in draws], np.ones((len(draws), 3))
+    for row, ((*loops, draw), box, sign) in enumerate(zip(program.chains, boxes, signs, strict=True)):
+        if box is None or any(loop.name != "mirror" for loop in loops):
+            continue
+        for _, axis, offset in (loop.values for loop in loops):
+            if offset == 0 and box.centre[int(axis)] < 0:
+                sign[int(axis)] = -1
+        if (sign < 0).any():
+            turn = sign[:, None] * box.rotation * [1, 1, sign.prod()]  # a box is its own image along its last axis
+            options[row] = drawings(Box(sign * box.centre, turn, box.half), draw.name)
+    same = _drawing_the_same(draws, options, signs)
+    return _redrawn(program, [found[0] if found else draw for found, draw in zip(same, draws, strict=True)])
 
 
-def _drawing_the_same(candidates: Sequence[Draw], node: Draw, box: Box, signs: FloatArray) -> list[Draw]:
-    """The candidates that draw a node, or its mirror image by signs of the coordinates, in a box; with its role."""
-    if not candidates:
-        return []
-    sample = sample_surface(scene_of([node]), SETTINGS.points, torch.Generator().manual_seed(0))
-    points = sample.points.double() * torch.from_numpy(signs)
-    limit = min(SETTINGS.equal_distance, SETTINGS.equal_share * box.half.min())
-    off = signed_distance(scene_of(candidates), points.expand(len(candidates), -1, -1)).abs().amax(-1).tolist()
-    return [replace(candidate, role=node.role) for candidate, far in zip(candidates, off, strict=True) if far < limit]
+def _redrawn(program: Program, draws: Sequence[Draw]) -> Program:
+    """The program with other drawing statements inside its loops."""
+    return Program(tuple(nest((*chain[:-1], draw)) for chain, draw in zip(program.chains, draws, strict=True)))
+
+
+def _drawing_the_same(draws: Sequence[Draw], options: Sequence[Sequence[Draw]], signs: FloatArray) -> list[list[Draw]]:
+    """Those options for each drawing that draw the same, or its mirror image by signs (B, 3) of the coordinates; with
+    its role.  Drawings with options are one solid each."""
+    same, points, limits = [list[Draw]() for _ in draws], list[Tensor](), list[float]()
+    pairs = [(k, option) for k, row in enumerate(options) for option in row]
+    if not pairs:
+        return same
+    for scene, row, sign in zip(scene_of(draws), options, torch.from_numpy(signs), strict=True):
+        if row:  # one seed for each: the sample does not depend on the other drawings
+            sample = sample_surface(scene, SETTINGS.points, torch.Generator().manual_seed(0))
+            points += [sample.points * sign] * len(row)
+            limits += [SETTINGS.equal_share * float(scene.bounds[scene.mask].min())] * len(row)
+    off = signed_distance(scene_of([option for _, option in pairs]), torch.stack(points)).abs().amax(-1).tolist()
+    for (k, option), far, limit in zip(pairs, off, limits, strict=True):
+        if far < min(SETTINGS.equal_distance, limit):
+            same[k].append(replace(option, role=draws[k].role))
+    return same

@@ -149,8 +149,8 @@ def _shifted(draw: Node, shift: Sequence[float]) -> Node:
 def named_anew(program: Program) -> Program:
     """The program with each block drawn by the plainest statement, with a role by its neighbours, and in order;
     existing roles are ignored."""
-    plain = (simplest(nest((*loops, Draw(draw.name, draw.values)))) for *loops, draw in program.chains)
-    return in_order(with_roles(Program(tuple(plain))))
+    bare = (nest((*loops, Draw(draw.name, draw.values))) for *loops, draw in program.chains)
+    return in_order(with_roles(simplest(Program(tuple(bare)))))
 
 
 def in_order(program: Program) -> Program:

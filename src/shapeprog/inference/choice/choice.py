@@ -36,12 +36,13 @@ def choose(
     useful = gains > 0
     useful[list(start)] = True
     index = np.flatnonzero(useful)
-    rows, interior = table.rows[np.ix_(index, [*range(last), *(last + index)])], table.interior[index]
+    hidden = table.rows[np.ix_(index, last + index)]
     data = (
-        rows, interior, table.weights, *_words(rows[:, :last]), *_words(interior), table.exposed[index],
-        table.sample_price[index], table.prices[index] + SETTINGS.earlier * index / len(table.prices), gains[index],
+        *_words(table.rows[index, :last]), *_words(table.interior[index]), table.weights, hidden,
+        np.ascontiguousarray(hidden.T), table.exposed[index], table.sample_price[index],
+        table.prices[index] + SETTINGS.earlier * index / len(table.prices), gains[index],
     )  # fmt: skip
-    levels = (*SETTINGS.interior, 0.0) if interior.any() else (0.0,)
+    levels = (*SETTINGS.interior, 0.0) if len(data[3]) else (0.0,)
     first = np.searchsorted(index, np.array(start, np.int64))
     searches = [(levels, first[:0])] * SETTINGS.restarts + [((0.0,), first)]
     steps, count = SETTINGS.restarts * len(levels) + 1, len(searches)
@@ -59,10 +60,10 @@ def choose(
     return tuple(np.sort(index[selected[selected >= 0]]).tolist())
 
 
-def _words(rows: Bits) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The words that hold bits, row after row, and the index of the first of each row."""
+def _words(rows: Bits) -> tuple[Bits, npt.NDArray[np.uint32], npt.NDArray[np.int64]]:
+    """The words that hold bits, row after row, their indices, and the first of each row."""
     row, words = np.nonzero(rows)
-    return np.ascontiguousarray(words), np.searchsorted(row, np.arange(len(rows) + 1))
+    return rows[row, words], words.astype(np.uint32), np.searchsorted(row, np.arange(len(rows) + 1))
 
 
 def explained(table: CoverageTable, indices: Sequence[int] | Array) -> float:

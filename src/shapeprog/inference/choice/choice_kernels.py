@@ -18,30 +18,30 @@ BLINK = 0.05
 
 
 @helper
-def gain(data, cover, under, selected, count, candidate):
+def gain(data, cover, under, charged, selected, count, candidate):
     """Increase in value of the selected candidates with one more candidate; ``data`` as for ``search``."""
-    rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, penalty = data
-    total, last = -prices[candidate], len(weights)
+    bits, words, begins, inside, inner, starts, weights, hiders, sample_price, prices, penalty = data
+    total = -prices[candidate]
     for index in range(begins[candidate], begins[candidate + 1]):
         word = words[index]
-        total += weights[word] * ones(rows[candidate, word] & ~cover[word])
-    total -= sample_price[candidate] * ones(exposed[candidate] & ~cover[last + candidate])
+        total += weights[word] * ones(bits[index] & ~cover[word])
+    total -= sample_price[candidate] * ones(charged[candidate])
     for index in range(count):  # samples of the others that it hides are no longer charged
         peer = selected[index]
-        total += sample_price[peer] * ones(exposed[peer] & rows[candidate, last + peer] & ~cover[last + peer])
+        total += sample_price[peer] * ones(charged[peer] & hiders[peer, candidate])
     for index in range(starts[candidate], starts[candidate + 1]):  # explained points in its interior; and the penalty
         word = inner[index]
-        new = interior[candidate, word] & ~under[word]
+        new = inside[index] & ~under[word]
         total -= weights[word] * (ones(new & cover[word]) + penalty * ones(new))
     return total
 
 
 @kernel(
-    "f8(u8[:, ::1], u8[:, ::1], f8[::1], i8[::1], i8[::1], i8[::1], i8[::1], u8[::1], f8[::1],"
+    "f8(u8[::1], u4[::1], i8[::1], u8[::1], u4[::1], i8[::1], f8[::1], u8[:, ::1], u8[:, ::1], u8[::1], f8[::1],"
     " f8[::1], f8[::1], f8, i8, i8, i8[::1], i8[::1])"
 )
 def search(
-    rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, gains,
+    bits, words, begins, inside, inner, starts, weights, hidden, hiders, exposed, sample_price, prices, gains,
     penalty, rounds, seed, initial_set, best_set,
 ):  # fmt: skip
     """The value of the best set by ruin and recreate: drop some of the selected, refill greedily, accept what is no
@@ -52,28 +52,32 @@ def search(
 
     Parameters
     ----------
-    rows, interior, weights, exposed, sample_price, prices
+    bits, words, begins
+        The weighted words of each candidate that hold bits, one candidate after another; their indices; and the first
+        of each candidate.
+    inside, inner, starts
+        The same of each interior.
+    hidden, hiders
+        The samples of each candidate that others hide (C, C): the first index is the one that hides, and the other.
+    weights, exposed, sample_price, prices
         See ``CoverageTable``.
     gains
         Upper bounds (C,) of the gain of each candidate: what it explains, less the price of its text.
-    words, begins, inner, starts
-        Indices of the weighted words of each candidate that hold bits, one candidate after another, and the first of
-        each; the same of each interior.
     penalty
         Price of interior points as a multiple of their weight, whether others explain them or not.
     initial_set, best_set
         Initial candidates (S,), and output: the best (M,), -1 beyond the last.
     """
-    data = rows, interior, weights, words, begins, inner, starts, exposed, sample_price, prices, penalty
-    most, total, last = min(len(best_set), len(exposed)), len(exposed), len(weights)
-    cover, under = np.empty(rows.shape[1], np.uint64), np.empty(interior.shape[1], np.uint64)
+    data = bits, words, begins, inside, inner, starts, weights, hiders, sample_price, prices, penalty
+    most, total = min(len(best_set), len(exposed)), len(exposed)
+    cover, under = np.empty(len(weights), np.uint64), np.empty(len(weights), np.uint64)
     incumbent, selected = initial_set.copy(), np.empty(most, np.int64)
     accepted, best_value, draws = 0.0, -np.inf, 0
     for turn in range(rounds + 1):
         share = RUIN_LEAST + (RUIN_MOST - RUIN_LEAST) * uniform(seed, draws)
         dropped = int(uniform(seed, draws + 1) * len(incumbent))
         draws += 2
-        count, step, value, bound = 0, 0, 0.0, gains.copy()
+        count, step, value, bound, charged = 0, 0, 0.0, gains.copy(), exposed.copy()
         cover[:] = np.uint64(0)
         under[:] = np.uint64(0)
         while True:
@@ -84,7 +88,7 @@ def search(
                 draws += 1
                 if turn > 0 and (step - 1 == dropped or uniform(seed, draws) < share):
                     continue
-                best = gain(data, cover, under, selected, count, best_candidate)
+                best = gain(data, cover, under, charged, selected, count, best_candidate)
             else:
                 if value > best_value:
                     best_value = value
@@ -98,7 +102,7 @@ def search(
                     candidate = first if trial < 0 else trial
                     if bound[candidate] <= best or (turn > 0 and uniform(seed, draws + candidate) < BLINK):
                         continue
-                    bound[candidate] = gain(data, cover, under, selected, count, candidate)
+                    bound[candidate] = gain(data, cover, under, charged, selected, count, candidate)
                     if bound[candidate] > best:
                         best, best_candidate = bound[candidate], candidate
                 draws += total
@@ -107,12 +111,13 @@ def search(
             value += best
             price, samples = sample_price[best_candidate], exposed[best_candidate]
             for candidate in range(total):  # samples of the one that the other hides are charged no longer
-                bound[candidate] += price * ones(samples & rows[candidate, last + best_candidate])
-            for word in range(len(cover)):
-                cover[word] |= rows[best_candidate, word]
-            for word in range(len(under)):  # no later candidate gains there
-                cover[word] |= interior[best_candidate, word]
-                under[word] |= interior[best_candidate, word]
+                bound[candidate] += price * ones(samples & hiders[best_candidate, candidate])
+                charged[candidate] &= ~hidden[best_candidate, candidate]
+            for index in range(begins[best_candidate], begins[best_candidate + 1]):
+                cover[words[index]] |= bits[index]
+            for index in range(starts[best_candidate], starts[best_candidate + 1]):  # no later candidate gains there
+                cover[inner[index]] |= inside[index]
+                under[inner[index]] |= inside[index]
             selected[count] = best_candidate
             count += 1
         if value >= accepted - THRESHOLD * (1.0 - turn / (rounds + 1.0)):

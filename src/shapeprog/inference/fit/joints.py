@@ -15,6 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 from torch import Tensor
 
+from shapeprog.geometry.arrays import numbers
 from shapeprog.geometry.distance import projected, signed_distance
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
@@ -107,8 +108,9 @@ def _inner(scene: Scene, points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
 def _lowest(scene: Scene) -> Float[Tensor, "S 3"]:
     """The lowest points of primitives (S,)."""
     points = torch.zeros_like(scene.centre)
+    sizes, rotations, centres = map(numbers, (scene.size, scene.rotation, scene.centre))
     for n, kind in enumerate(scene.kind.tolist()):
-        vertices, _ = primitives[kind].mesh(scene.size[n].double().numpy())
-        placed = torch.from_numpy(vertices) @ scene.rotation[n].T + scene.centre[n]
-        points[n] = placed[placed[:, 0] <= placed[:, 0].min() + 1e-6].mean(0)
+        vertices, _ = primitives[kind].mesh(sizes[n])
+        placed = vertices @ rotations[n].T + centres[n]
+        points[n] = torch.from_numpy(placed[placed[:, 0] <= placed[:, 0].min() + 1e-6]).mean(0)
     return points

@@ -77,11 +77,11 @@ class Tunable:
 
     def poses(self, values: Float[Tensor, " F"]) -> Poses:
         """Primitives and slopes where the numbers are these, by central differences in one batch of programs."""
-        steps = STEP * torch.eye(len(values), dtype=values.dtype)
-        scenes = self._plan.scene(self._filled(values + torch.cat([steps, -steps, torch.zeros_like(steps[:1])])))
+        count, steps = len(values), STEP * torch.eye(len(values), dtype=values.dtype)
+        scenes = self._plan.scene(self._filled(torch.cat([values + steps, values - steps, values[None]])))
         rows = torch.cat([scenes.size, scenes.centre, scenes.rotation.flatten(-2)], -1)
-        upper, lower = rows[:-1].unflatten(0, (2, len(values)))
-        return Poses(scenes[-1], ((upper - lower) / (2 * STEP)).permute(1, 2, 0).contiguous())
+        slopes = (rows[:count] - rows[count:-1]) / (2 * STEP)
+        return Poses(scenes[-1], slopes.permute(1, 2, 0).contiguous())
 
     def settled(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers, rounded."""

@@ -299,6 +299,21 @@ def test_a_row_of_two_parts_of_different_roles_is_separated_and_one_of_equal_she
     assert separated(program, 3) == program, "no more blocks than allowed"
 
 
+def test_a_door_and_a_back_that_mirror_each_other_are_separated_and_aprons_are_not() -> None:
+    sides = "for i in mirror(side):\n    box(at=(-12, -6, 9), size=(24, 12, 1))\n"
+    front = "for i in mirror(depth):\n    box(at=(-11, 5, -9), size=(23, 1, 18))\n"
+    doors = "for i in mirror(depth):\n    for j in mirror(side):\n        box(at=(-11, 5, 0.2), size=(23, 1, 8.6))\n"
+    for text, roles in ((front, ["side", "panel", "door"]), (doors, ["side", "panel", "door"])):
+        program = Program(sp.parse(sides + "box(at=(-12, -6, -9), size=(1, 12, 18))\n" + text).body)
+        result = separated(program, 10)
+        assert [draw.word for draw in with_roles(result).draws if draw.word != "base"] == roles
+        before, after = (sorted(sp.unroll(each).centre.tolist()) for each in (program, result))
+        assert after == before
+    table = "box(at=(8, -8, -12), size=(1, 16, 24))\nfor i in mirror(depth):\n    box(at=(6, 6, -10), size=(2, 1, 20))\n"
+    program = Program(sp.parse(table).body)
+    assert separated(program, 10) == program
+
+
 def test_a_ring_between_legs_is_no_shelf() -> None:
     text = """
 cylinder(at=(8, 0, 0), height=1, radius=6)  # top

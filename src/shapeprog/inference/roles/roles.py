@@ -17,7 +17,8 @@ from itertools import cycle
 import numpy as np
 
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.candidates.drawings import simplest
+from shapeprog.inference.candidates.drawings import simplest, solid_boxes
+from shapeprog.inference.candidates.loops import mirrors
 from shapeprog.inference.roles.measures import Mask, Parts
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Node, Program, nest
@@ -125,17 +126,33 @@ def with_roles(program: Program) -> Program:
 
 
 def separated(program: Program, most: int) -> Program:
-    """The program, of one node for each block, with rows of two copies of different roles, such as a door and a back,
-    as two blocks each, while there are at most so many."""
+    """The program, of one node for each block, with pairs of different roles as two blocks each, while there are at
+    most so many: rows of two copies, and boxes mirrored from front to rear, such as a door and the back of a case."""
     body = list(program.body)
     for index in reversed(range(len(body))):
         *outer, draw = Program((body[index],)).chains[0]
-        if len(body) < most and outer and outer[-1].name == "translate" and outer[-1].values[0] == 2:
-            pair = [nest((*outer[:-1], copy)) for copy in (draw, _shifted(draw, outer[-1].values[1:]))]
+        for k, loop in enumerate(outer):
+            shift = _to_copy(loop, outer[k + 1 :], draw)
+            if shift is None or len(body) >= most:
+                continue
+            pair = [nest((*outer[:k], *outer[k + 1 :], copy)) for copy in (draw, _shifted(draw, shift))]
             trial = [*body[:index], *pair, *body[index + 1 :]]
             roles = roles_of_blocks(Program(tuple(trial)))
-            body = trial if roles[index] != roles[index + 1] else body
+            if roles[index] != roles[index + 1]:
+                body = trial
+                break
     return Program(tuple(body))
+
+
+def _to_copy(loop: Node, inner: Sequence[Node], draw: Draw) -> Sequence[float] | None:
+    """How far the second copy of a pair is from the first, along up, depth and side; ``None`` for other loops."""
+    if loop.name == "translate" and loop.values[0] == 2 and not inner:
+        return loop.values[1:]
+    level = all(node.name == "translate" and node.values[1 + DEPTH] == 0 or mirrors(node, SIDE) for node in inner)
+    if mirrors(loop, DEPTH) and level and draw.name in ("box", "cushion"):
+        ((box,),) = solid_boxes([draw])
+        return 0.0, 2 * (loop.values[2] - float(box.centre[DEPTH])), 0.0
+    return None
 
 
 def _shifted(draw: Node, shift: Sequence[float]) -> Node:

@@ -185,13 +185,28 @@ for i in translate(4, by=(0, 0, 3)):
     box(at=(-10, -5, -5.9), size=(22, 0.6, 2.8))  # door
 """
 
+BETWEEN_ARMS = """
+box(at=(-6, -6, -9), size=(2.5, 11, 18))  # base
+cushion(at=(-3.5, -6, -9), size=(2.5, 10, 18), edge=0.5)  # seat
+for i in mirror(side):
+    box(at=(-6, -6, 9), size=(12, 12, 3))  # arm
+box(at=(-6, 4, -9), size=(12, 2, 18))  # back
+"""
+
+CORNER = """
+box(at=(-6, -2, -12), size=(4, 14, 9))  # seat
+for i in translate(2, by=(0, 0, 7)):
+    box(at=(-6, 2, -3), size=(4, 8, 7))  # seat
+box(at=(-6, 10, -12), size=(12, 2, 24))  # back
+"""
+
 WHOLE = [
     CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, DESK,
-    PLATE, CHEST, DOORS, SPLAYED
+    PLATE, CHEST, DOORS, SPLAYED, BETWEEN_ARMS, CORNER
 ]  # fmt: skip
 NAMES = ["chair", "swivel chair", "upholstered chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
 NAMES += ["slatted bench", "tall cabinet", "sideboard", "desk", "chair on a plate", "chest of drawers", "doors"]
-NAMES += ["sideboard on splayed legs"]
+NAMES += ["sideboard on splayed legs", "sofa between high arms", "corner sofa"]
 
 
 def wanted(text: str) -> list[str]:
@@ -303,14 +318,14 @@ def test_a_door_and_a_back_that_mirror_each_other_are_separated_and_aprons_are_n
     sides = "for i in mirror(side):\n    box(at=(-12, -6, 9), size=(24, 12, 1))\n"
     front = "for i in mirror(depth):\n    box(at=(-11, 5, -9), size=(23, 1, 18))\n"
     doors = "for i in mirror(depth):\n    for j in mirror(side):\n        box(at=(-11, 5, 0.2), size=(23, 1, 8.6))\n"
-    for text, roles in ((front, ["side", "panel", "door"]), (doors, ["side", "panel", "door"])):
+    for text in (front, doors):
         program = Program(sp.parse(sides + "box(at=(-12, -6, -9), size=(1, 12, 18))\n" + text).body)
         result = separated(program, 10)
-        assert [draw.word for draw in with_roles(result).draws if draw.word != "base"] == roles
+        assert [draw.word for draw in with_roles(result).draws if draw.word != "base"] == ["side", "panel", "door"]
         before, after = (sorted(sp.unroll(each).centre.tolist()) for each in (program, result))
         assert after == before
-    table = "box(at=(8, -8, -12), size=(1, 16, 24))\nfor i in mirror(depth):\n    box(at=(6, 6, -10), size=(2, 1, 20))\n"
-    program = Program(sp.parse(table).body)
+    aprons = "for i in mirror(depth):\n    box(at=(6, 6, -10), size=(2, 1, 20))\n"
+    program = Program(sp.parse("box(at=(8, -8, -12), size=(1, 16, 24))\n" + aprons).body)
     assert separated(program, 10) == program
 
 

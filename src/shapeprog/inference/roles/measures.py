@@ -81,11 +81,16 @@ class Parts:
     def _main_surface(self) -> None:
         """Which parts are the main surface, and its bounds (3,)."""
         first, last = self.low.min(0), self.high.max(0)
-        off = (self.low + self.high - first - last) / 2
-        central = (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
+        near = (np.abs(self.top[:, None] - self.top) <= self.near) * np.where(self.lying, self.face, 0)
+        cover = near.sum(1)  # how much is covered by what lies at about the height of each part
+        middle = (self.low + self.high - first - last) / 2
+        central, together = (
+            (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
+            for off in (middle, near @ middle / np.maximum(cover, 1e-9)[:, None])
+        )
         fitting = self.lying & central
-        # How much is covered by what lies at about the height of each part.
-        cover = (np.abs(self.top[:, None] - self.top) <= self.near) @ np.where(self.lying, self.face, 0)
+        if not fitting.any():  # the seat of a corner sofa is several parts
+            fitting = self.lying & together
         if not fitting.any():  # an upholstered seat that reaches the floor
             cover = self.face
             fitting = self.squat & central & (self.top <= self.floor + 0.75 * self.size[UP])

@@ -1,10 +1,10 @@
 """Roles of the parts of a program: one for every drawing statement, by rules on its solids alone.
 
 First the kind of the whole is determined.  A seat or a bed has a main surface with a part that rises behind it, a seat
-may have parts that rise on both sides instead; neither is between walls as high as the whole.  All else is a table or a
-case.  A chair may face any way.  Then the first rule of its list that fits a solid gives it a role.  Copies of one
-statement have one role: that of most of their surface, or one that covers all of theirs.  A row of two parts of
-different roles becomes two statements.
+may have parts that rise on both sides instead; neither is closed above or in front between walls as high as the whole.
+All else is a table or a case.  A chair may face any way.  Then the first rule of its list that fits a solid gives it a
+role.  Copies of one statement have one role: that of most of their surface, or one that covers all of theirs.  A row of
+two parts of different roles becomes two statements.
 """
 
 from __future__ import annotations
@@ -144,11 +144,11 @@ def separated(program: Program, most: int) -> Program:
     return Program(tuple(body))
 
 
-def _to_copy(loop: Node, inner: Sequence[Node], draw: Draw) -> Sequence[float] | None:
+def _to_copy(loop: Node, inner: Sequence[Node], draw: Node) -> Sequence[float] | None:
     """How far the second copy of a pair is from the first, along up, depth and side; ``None`` for other loops."""
     if loop.name == "translate" and loop.values[0] == 2 and not inner:
         return loop.values[1:]
-    level = all(node.name == "translate" and node.values[1 + DEPTH] == 0 or mirrors(node, SIDE) for node in inner)
+    level = all((node.name == "translate" and node.values[1 + DEPTH] == 0) or mirrors(node, SIDE) for node in inner)
     if mirrors(loop, DEPTH) and level and draw.name in ("box", "cushion"):
         ((box,),) = solid_boxes([draw])
         return 0.0, 2 * (loop.values[2] - float(box.centre[DEPTH])), 0.0
@@ -244,10 +244,12 @@ def _leaned_on(p: Parts) -> float:
 def _kind(p: Parts) -> tuple[Rule, ...]:
     """The rules for the kind of the whole."""
     walls = p.wall & p.outermost & (p.up >= 0.6 * p.size[UP]) & (p.top >= p.floor + 0.9 * p.size[UP])
-    if not p.main.any() or walls.sum() > 1 or (p.rising & p.bulky).any():
+    above = p.wide & (p.top >= p.floor + 0.8 * p.size[UP])
+    closed = above | ((p.front | p.level) & p.rising & (p.rear < 0) & (p.span > 0.3))  # a sofa is open above its seat
+    if not p.main.any() or (walls.sum() > 1 and closed.any()) or (p.rising & p.bulky).any():
         return CASE
     high = p.rising & (p.top >= p.main_high[UP] + 0.12 * p.size[UP])
     if (high & (p.rear > 0.1)).any():
-        return SEATING if p.size[DEPTH] <= p.size[SIDE] or p.size[UP] >= 0.6 * p.size[DEPTH] else BED
+        return SEATING if p.size[DEPTH] <= p.size[SIDE] + p.near or p.size[UP] >= 0.6 * p.size[DEPTH] else BED
     arms = (p.low + p.high - p.main_low - p.main_high)[high & (p.aside > 0.3), SIDE]
     return SEATING if (arms < 0).any() and (arms > 0).any() and not p.cased else CASE

@@ -126,6 +126,8 @@ class Parts:
         self.above: Mask = self.bottom >= top - 2 * self.near  # it begins there
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
+        across = self.facing_front | (self.level & (self.up > 2 * self.depth))
+        self.head_or_foot: Mask = across & (self.span >= 0.5)  # a board across the head or foot of a bed
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
         self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + 3 * self.near
         # Of the whole: something wide lies right under the main surface.

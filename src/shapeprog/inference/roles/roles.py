@@ -69,13 +69,15 @@ SEATING: tuple[Rule, ...] = (
 )
 
 BED: tuple[Rule, ...] = (
-    ("headboard", lambda p: p.rising & p.facing_front & (p.span >= 0.6) & (p.rear > 0.25)),
-    ("footboard", lambda p: p.facing_front & (p.span >= 0.6) & (p.rear < -0.25)),
-    ("footboard", lambda p: p.level & (p.up > 2 * p.depth) & (p.span >= 0.6) & (p.rear < -0.4)),
+    ("headboard", lambda p: p.head_or_foot & (p.rear > 0.25) & (p.top >= p.main_high[UP] + p.near)),
+    ("footboard", lambda p: p.head_or_foot & (p.rear < -0.25)),
     ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
     ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
     ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
     *SUPPORTING,
+    ("leg", lambda p: p.grounded & p.upright),  # up to a headboard
+    ("post", lambda p: p.upright),
+    ("rail", lambda p: p.level),
     ("body", anything),
 )
 
@@ -250,6 +252,9 @@ def _kind(p: Parts) -> tuple[Rule, ...]:
         return CASE
     high = p.rising & (p.top >= p.main_high[UP] + 0.12 * p.size[UP])
     if (high & (p.rear > 0.1)).any():
-        return SEATING if p.size[DEPTH] <= p.size[SIDE] + p.near or p.size[UP] >= 0.6 * p.size[DEPTH] else BED
+        _, depth, side = p.size
+        low = p.size[UP] < (0.6 if depth > side else 0.5) * depth
+        covered = p.face[p.main].max() >= 0.6 * depth * side  # not by a corner sofa
+        return BED if low and covered and depth > 0.75 * side else SEATING
     arms = (p.low + p.high - p.main_low - p.main_high)[high & (p.aside > 0.3), SIDE]
     return SEATING if (arms < 0).any() and (arms > 0).any() and not p.cased else CASE

@@ -22,7 +22,7 @@ from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.elements import Slot
-from shapeprog.inference.ties.expressions import solved
+from shapeprog.inference.ties.expressions import DISTANCES, _carriable, carried, solved
 from shapeprog.inference.ties.groups import grouped, simplified
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.misfit import Misfit, closeness
@@ -618,6 +618,31 @@ def test_parts_move_with_a_shared_number_of_those_that_they_touch():
     assert "top=seat_drop - 4" in text
     for factor in (0.7, 1.4):
         assert pieces(*union_mesh(unroll(sp.set(sp.parse(text), seat_drop=10 * factor)))) == 1
+
+
+def test_distances_are_measured_from_another_number_and_sizes_are_not():
+    source = placed(sp.parse(TABLE)).source
+    assert source is not None
+    layout = Layout(source)
+    count = len(layout.slots)
+    front = layout.index[layout.parts[1], "front"]
+    carriable = _carriable(np.eye(count), [*range(count)], layout, {*layout.parts}, front)
+    assert carriable
+    assert {layout.slots[k].kind for k in carriable} <= {*DISTANCES}
+
+
+def test_a_distance_that_rounds_to_zero_is_no_number(monkeypatch: pytest.MonkeyPatch):
+    def small(*arguments):
+        solution, values = carried(*arguments)
+        slots = arguments[1].slots
+        values[[slots[k].kind == "clearance" for k in solution.free]] = 0.01
+        return solution, values
+
+    before = tied_table()
+    monkeypatch.setattr(tying, "carried", small)
+    after = tied_table()
+    assert free_numbers(after) < free_numbers(before)
+    assert all(name.value for name in sp.names(after))
 
 
 @pytest.mark.parametrize("lap", [0.02, 0.1])

@@ -29,6 +29,9 @@ ELIMINATED = {
 }  # fmt: skip
 """Which kinds of numbers rather follow from others: small ones first."""
 
+DISTANCES = "clearance", "offset"
+"""Kinds of numbers that may be zero, or measured from another."""
+
 NOTHING = 1e-7  # factors up to this are zero
 
 
@@ -97,7 +100,7 @@ def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[So
     for n, z in enumerate(shared):
         for _ in range(TIES.operations):
             cost, lost = changes[n]
-            ways = [*product(_carriable(factors, layout, lost, z), (1.0, -1.0))] if cost else []
+            ways = [*product(_carriable(factors, free, layout, lost, z), (1.0, -1.0))] if cost else []
             others = contacts.after(np.array([(factors[:, z] + way * factors[:, y]) * values[z] for y, way in ways]))
             least, best = min(((more, index) for index, (more, _) in enumerate(others)), default=(cost, 0))
             if least >= cost:
@@ -109,8 +112,8 @@ def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[So
     return Solution(factors, free), values
 
 
-def _carriable(factors: FloatArray, layout: Layout, lost: set[int], z: int) -> list[int]:
-    """Free numbers that alone move one of these lines along an axis along which another free number moves parts."""
+def _carriable(factors: FloatArray, free: list[int], layout: Layout, lost: set[int], z: int) -> list[int]:
+    """Free distances that alone move one of these lines along an axis along which another free number moves parts."""
     slots = layout.slots
     lines = {around for line in lost for around in (line, *layout.loops_around[line])}
     axes = {slots[p].axis for p in np.flatnonzero(factors[:, z])} - {-1}
@@ -119,7 +122,7 @@ def _carriable(factors: FloatArray, layout: Layout, lost: set[int], z: int) -> l
         used = np.flatnonzero(factors[p])
         if slot.line in lines and slot.axis in axes and len(used) == 1 and used[0] != z:
             rows = factors[factors[:, used[0]] != 0]
-            if (rows == rows[0]).all():
+            if (rows == rows[0]).all() and slots[free[used[0]]].kind in DISTANCES:
                 result.add(int(used[0]))
     return sorted(result)
 

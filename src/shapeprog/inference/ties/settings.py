@@ -76,6 +76,7 @@ class TieSettings:
     near: float = 0.01  # share of the diagonal of the target within which surfaces are close, as in the evaluation
 
     # Text
+    zero: float = 0.015  # distances up to this are no numbers
     negative: float = 1.5  # operators that a size is worth which may become negative: a difference
     repeated: float = 0.1  # operators that every use of a sum after the first is worth, as it can be named
     upright: float = 0.12  # cells by which the ends of an upright part may be off its axis

@@ -24,7 +24,7 @@ from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.fit.tunable import CELLS, DEGREES
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.ties.anchors import anchors_of
-from shapeprog.inference.ties.expressions import Solution, carried, solved
+from shapeprog.inference.ties.expressions import DISTANCES, Solution, carried, solved
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.misfit import Misfit, closeness
 from shapeprog.inference.ties.relations import Relation, relations, worthwhile
@@ -132,6 +132,9 @@ class _Ties:
             solution, values = self._solved(price)
             digits = (DEGREES if slots[k].kind == "angle" else self.decimals for k in solution.free)
             free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
+            zero = (np.abs(free) <= TIES.zero) & [slots[k].kind in DISTANCES for k in solution.free]
+            solution = Solution(solution.factors[:, ~zero], np.array(solution.free)[~zero].tolist())
+            free = free[~zero]
             loose = self._loose(solution.factors @ free)
             loose = loose and loose - self._loose(self.layout.numbers)  # those that were so before do not count
             if not loose:

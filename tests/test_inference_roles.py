@@ -200,13 +200,32 @@ for i in translate(2, by=(0, 0, 7)):
 box(at=(-6, 10, -12), size=(12, 2, 24))  # back
 """
 
+SLATTED_BED = """
+for i in translate(10, by=(0, 2.2, 0)):
+    box(at=(-4, -11, -8), size=(0.5, 1, 16))  # slat
+for i in mirror(side):
+    box(at=(-5, -11, 8), size=(2, 22, 0.6))  # side
+box(at=(-6, 11, -9), size=(10, 0.8, 18))  # headboard
+box(at=(-6, -11.8, -9), size=(4, 0.8, 18))  # footboard
+"""
+
+TWO_MATTRESSES = """
+for i in mirror(side):
+    box(at=(-3, -11, 0.1), size=(2, 22, 10.9))  # mattress
+    for j in mirror(depth):
+        box(at=(-5, 9, 9), size=(2, 1, 1))  # foot
+box(at=(-5, 11, -11), size=(10, 1, 22))  # headboard
+"""
+
 WHOLE = [
     CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, DESK,
-    PLATE, CHEST, DOORS, SPLAYED, BETWEEN_ARMS, CORNER
+    PLATE, CHEST, DOORS, SPLAYED, BETWEEN_ARMS, CORNER, SLATTED_BED,
+    TWO_MATTRESSES
 ]  # fmt: skip
 NAMES = ["chair", "swivel chair", "upholstered chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
 NAMES += ["slatted bench", "tall cabinet", "sideboard", "desk", "chair on a plate", "chest of drawers", "doors"]
-NAMES += ["sideboard on splayed legs", "sofa between high arms", "corner sofa"]
+NAMES += ["sideboard on splayed legs", "sofa between high arms", "corner sofa", "slatted bed"]
+NAMES += ["two mattresses"]
 
 
 def wanted(text: str) -> list[str]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import suppress
 
 import torch
 from jaxtyping import Float
@@ -16,7 +15,6 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.scene import Scene
 from shapeprog.inference.choice.connecting import floating
 from shapeprog.language.dimensions import in_unit, literal_lengths
 from shapeprog.language.parameters import to_float32
@@ -25,10 +23,14 @@ from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import Plan
 
-TOLERANCES = (0.015, 0.004, 0.001)
-"""How far a face may move, in cells; the smaller ones where parts come apart, and for programs in cells."""
+TOLERANCES = (0.015, 0.01, 0.004, 0.001)
+"""How far a face may move, in cells; the smaller ones where parts come apart."""
 
-ROUNDING = 1e-6  # cells that float32 may add to that
+IN_CELLS = TOLERANCES[2:]
+"""The same for programs in cells."""
+
+STEP = 1e-4  # change of a number, in cells, by which slopes are measured
+ROUNDING = 1e-6  # cells that float32 may add to a move
 
 CELLS = "cells"
 """The word for lengths in cells of the grid."""
@@ -59,22 +61,26 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     if not 0 < exact.size <= 256:  # rounding takes long for more primitives
         return exact
     loose = len(floating(program))
-    for tolerance in TOLERANCES[unit is None :]:
-        with suppress(ShapeProgError):  # something has no size any more
-            result = _rounded(exact, tolerance)
-            if len(floating(result)) <= loose:
-                return result
+    for tolerance in TOLERANCES if unit else IN_CELLS:
+        result = _rounded(exact, tolerance)
+        if result is not None and len(floating(result)) <= loose:
+            return result
     return exact
 
 
-def _rounded(program: Program, tolerance: float) -> Program:
+def _rounded(program: Program, tolerance: float) -> Program | None:
+    """The program with rounded numbers; ``None`` if a face then moves farther than the tolerance.
+
+    Moves are nearly linear in the numbers, so they are added up; what bars that are nearly upright do is not, so the
+    result is evaluated.
+    """
     lengths, with_numbers = literal_lengths(program)
-    farthest = tolerance * (1.0 if program.unit is None else program.unit.per_cell)
-    changed = [with_numbers([*lengths[:k], length + farthest, *lengths[k + 1 :]]) for k, length in enumerate(lengths)]
-    code = encode([program, *changed], dtype=torch.float64)
-    faces = _faces(Plan(code).scene(code.parameters))
-    slopes = (faces[1:] - faces[0]) / farthest  # near enough linear for such small changes
-    numbers, moved = [*lengths], torch.zeros_like(faces[0])
+    per_cell = 1.0 if program.unit is None else program.unit.per_cell
+    farthest, step = tolerance * per_cell, STEP * per_cell
+    changed = [with_numbers([*lengths[:k], length + step, *lengths[k + 1 :]]) for k, length in enumerate(lengths)]
+    before, *others = _faces([program, *changed])
+    slopes = [(faces - before) / step for faces in others]
+    numbers, moved = [*lengths], torch.zeros_like(before)
     for share in (0.5, 1.0):  # of the tolerance: numbers that are nearly round go first
         for k, length in enumerate(lengths):
             for tried in _rounder(length, share * farthest):
@@ -82,7 +88,12 @@ def _rounded(program: Program, tolerance: float) -> Program:
                 if float(then.abs().max()) <= share * tolerance + ROUNDING:
                     numbers[k], moved = tried, then
                     break
-    return with_numbers(numbers)
+    try:
+        result = with_numbers(numbers)
+        (after,) = _faces([result])
+    except ShapeProgError:  # something has no size any more
+        return None
+    return result if float((after - before).abs().max()) <= tolerance + ROUNDING else None
 
 
 def _rounder(number: float, farthest: float) -> Iterator[float]:
@@ -98,6 +109,9 @@ def _rounder(number: float, farthest: float) -> Iterator[float]:
                 yield tried
 
 
-def _faces(scene: Scene) -> Float[Tensor, "*batch N 2 3"]:
-    """The lowest and highest corners of the boxes around the primitives of a scene, along the axes of the grid."""
+def _faces(programs: list[Program]) -> Float[Tensor, "B N 2 3"]:
+    """The lowest and highest corners of the boxes around the primitives of programs that differ in numbers alone, along
+    the axes of the grid."""
+    code = encode(programs, dtype=torch.float64)
+    scene = Plan(code).scene(code.parameters)
     return torch.stack([scene.centre - scene.reach, scene.centre + scene.reach], -2)

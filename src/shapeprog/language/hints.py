@@ -18,7 +18,7 @@ ROUND = 0.75  # least ratio of the sides of a section that may be round
 SOFT = 0.5  # least radius in cells of an edge that differs visibly from a sharp one
 STEEPEST = 45.0  # degrees up to which a board is tilted
 
-AXES = np.eye(3)
+AXES = np.eye(3)  # of the grid
 
 BULGE = (0.15, 0.9)
 """Height of an arc as a share of the half length of its chord, from and to which a flat box may hold one."""

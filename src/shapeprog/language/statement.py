@@ -274,7 +274,7 @@ class Language:
         return self._by_name[key] if isinstance(key, str) else self._by_id[key]
 
     def __iter__(self) -> Iterator[Statement]:
-        return iter(self._by_id.values())
+        return iter([*self._by_id.values()])  # a copy, as a loop may declare and forget statements
 
     @property
     def names(self) -> list[str]:

@@ -85,7 +85,7 @@ def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
 
 
 def single_boxes(nodes: Sequence[Node]) -> list[Box | None]:
-    """The box around the solid of each block, none where there are several."""
+    """The box around the solid of each block, ``None`` where there is not exactly one."""
     return [solids[0] if len(solids) == 1 else None for solids in solid_boxes(nodes)]
 
 
@@ -93,7 +93,7 @@ def simplest(program: Program) -> Program:
     """The program, of one node for each block, drawn by the statements with the fewest numbers, of those with a hint
     that draw the same solid.
 
-    Blocks are unchanged if their statement has a pivot or draws several solids.
+    Blocks are unchanged if their statement has a pivot or does not draw exactly one solid.
     """
     draws, boxes = program.draws, single_boxes(program.draws)
     turned = [language()[draw.name].pivot is not None for draw in draws]

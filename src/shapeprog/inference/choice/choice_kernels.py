@@ -58,7 +58,8 @@ def search(
     inside, inner, starts
         The same of each interior.
     hidden, hiders
-        The samples of each candidate that others hide (C, C): the first index is the one that hides, and the other.
+        The samples of one candidate that another hides (C, C), first indexed by the one that hides, and then by the
+        hidden one.
     weights, exposed, sample_price, prices
         See ``CoverageTable``.
     gains

@@ -57,12 +57,12 @@ def grow_patches(points, normals, neighbours, order, cosine, tolerance, min_size
 
 
 @kernel("void(f8[:, ::1], i8[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8, b1[:, ::1], f8[::1])")
-def near_boxes(points, name, start, end, centre, rotation, half, tolerance, explained, fill):
+def near_boxes(points, column, start, end, centre, rotation, half, tolerance, explained, fill):
     """Which points are near the surface of each box, and the share of the box's surface near which points lie.
 
     Points (N, 3) are near within ``tolerance``; those that may be near box b are from ``start[b]`` to ``end[b] - 1``.
     The surface is divided into squares of about two cells, at most eight along a side.  The outputs ``explained``
-    (B, N), where point k has the column ``name[k]``, and ``fill`` (B,) are initially zero.
+    (B, N), where point k has the column ``column[k]``, and ``fill`` (B,) are initially zero.
     """
     covered, at = np.empty((6, 8, 8), np.bool_), np.empty(3)
     count, square = np.empty(3, np.int64), np.empty(3, np.int64)
@@ -87,7 +87,7 @@ def near_boxes(points, name, start, end, centre, rotation, half, tolerance, expl
                 for axis in range(3):
                     if size[axis] - abs(at[axis]) <= tolerance:
                         face = 2 * axis + (1 if at[axis] > 0 else 0)
-                        explained[b, name[k]] = covered[face, square[(axis + 1) % 3], square[(axis + 2) % 3]] = True
+                        explained[b, column[k]] = covered[face, square[(axis + 1) % 3], square[(axis + 2) % 3]] = True
         total, filled = 0.0, 0.0
         for face in range(6):
             i, j = (face // 2 + 1) % 3, (face // 2 + 2) % 3

@@ -23,7 +23,8 @@ class Parts:
     The frame may be turned by so many quarters about up, for furniture that faces another way.
 
     The *main* surface is the seat, the table top or the mattress: the highest that covers at least half of what the
-    widest level covers, or the whole where nothing does.  A body is the main surface only where nothing lies.
+    widest level covers, or the whole where nothing does.  It may be several parts, as in a corner sofa.  A body is the
+    main surface only where nothing lies.
     """
 
     def __init__(self, scene: Scene, turns: int = 0) -> None:
@@ -81,12 +82,13 @@ class Parts:
     def _main_surface(self) -> None:
         """Which parts are the main surface, and its bounds (3,)."""
         first, last = self.low.min(0), self.high.max(0)
-        near = (np.abs(self.top[:, None] - self.top) <= self.near) * np.where(self.lying, self.face, 0)
-        cover = near.sum(1)  # how much is covered by what lies at about the height of each part
+        level = np.abs(self.top[:, None] - self.top) <= self.near
+        area = np.where(self.lying, self.face, 0)
+        cover = level @ area  # how much is covered by what lies at about the height of each part
         middle = (self.low + self.high - first - last) / 2
         central, together = (
             (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
-            for off in (middle, near @ middle / np.maximum(cover, 1e-9)[:, None])
+            for off in (middle, level @ (area[:, None] * middle) / np.maximum(cover, 1e-9)[:, None])
         )
         fitting = self.lying & central
         if not fitting.any():  # the seat of a corner sofa is several parts

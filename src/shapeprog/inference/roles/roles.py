@@ -4,7 +4,7 @@ First the kind of the whole is determined.  A seat or a bed has a main surface w
 may have parts that rise on both sides instead; neither is closed above or in front between walls as high as the whole.
 All else is a table or a case.  A chair may face any way.  Then the first rule of its list that fits a solid gives it a
 role.  Copies of one statement have one role: that of most of their surface, or one that covers all of theirs.  A row of
-two parts of different roles becomes two statements.
+two parts of different roles becomes two statements, and so do boxes mirrored from front to rear.
 """
 
 from __future__ import annotations
@@ -74,6 +74,7 @@ BED: tuple[Rule, ...] = (
     ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
     ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
     ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
+    ("slat", lambda p: p.level & (p.equal >= 5)),
     *SUPPORTING,
     ("leg", lambda p: p.grounded & p.upright),  # up to a headboard
     ("post", lambda p: p.upright),
@@ -254,7 +255,9 @@ def _kind(p: Parts) -> tuple[Rule, ...]:
     if (high & (p.rear > 0.1)).any():
         _, depth, side = p.size
         low = p.size[UP] < (0.6 if depth > side else 0.5) * depth
-        covered = p.face[p.main].max() >= 0.6 * depth * side  # not by a corner sofa
+        off = np.average((p.low + p.high - p.main_low - p.main_high)[p.main, SIDE], weights=p.face[p.main])
+        covered = (p.main_high - p.main_low)[DEPTH:].prod() >= 0.6 * depth * side
+        covered &= abs(off) <= 0.1 * side  # a corner sofa is wider on one side
         return BED if low and covered and depth > 0.75 * side else SEATING
     arms = (p.low + p.high - p.main_low - p.main_high)[high & (p.aside > 0.3), SIDE]
     return SEATING if (arms < 0).any() and (arms > 0).any() and not p.cased else CASE

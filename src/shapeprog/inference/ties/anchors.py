@@ -148,12 +148,14 @@ class _AxisAnchors:
         for _ in range(8):
             before, k = state, 0
             while k < count:  # from here on the next element that is cheaper with another choice
-                trials = np.tile(state, (count - k, most, 1))
-                trials[np.arange(count - k), :, np.arange(k, count)] = np.arange(most)
+                ahead = min(TIES.ahead, count - k)
+                trials = np.tile(state, (ahead, most, 1))
+                trials[np.arange(ahead), :, np.arange(k, k + ahead)] = np.arange(most)
                 costs = self._costs(trials.reshape(-1, count), exact=exact).reshape(-1, most)
                 cheaper = costs.min(1) < total - 1e-9
                 if not cheaper.any():
-                    break
+                    k += ahead
+                    continue
                 first = int(cheaper.argmax())
                 state, total = trials[first, costs[first].argmin()], float(costs[first].min())
                 k += first + 1

@@ -30,7 +30,7 @@ ELIMINATED = {
 """Which kinds of numbers rather follow from others: small ones first."""
 
 DISTANCES = "clearance", "offset"
-"""Kinds of numbers that may be zero, or measured from another."""
+"""Kinds of numbers that are dropped near zero, and that may be measured from another."""
 
 NOTHING = 1e-7  # factors up to this are zero
 
@@ -144,8 +144,8 @@ class _Contacts:
             return []
         changes = np.multiply.outer(parts, np.subtract(TIES.changes, 1)).swapaxes(1, 2)  # (S, 2, P)
         changed = self.layout.values(self.numbers + changes.reshape(-1, changes.shape[-1]))
-        boxes = boxes_of(self.layout.tunable.scenes(changed))
-        kept = gaps(boxes, self.first, self.second) < TIES.touch
+        scenes = map(self.layout.tunable.scenes, changed.split(64))  # more may be more primitives than allowed
+        kept = np.concatenate([gaps(boxes_of(scene), self.first, self.second) for scene in scenes]) < TIES.touch
         more = (self._pieces(kept) - self.pieces).reshape(len(parts), -1).sum(1).tolist()
         lines = self.line[np.stack([self.first, self.second])]
         lost = np.any(~kept.reshape(*changes.shape[:2], -1), 1)

@@ -59,8 +59,8 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
     lines = merged_lines(lines)
     while True:
         sides = {line: _sides(line) for line in lines if not isinstance(line, Group) or line.kind != "inside"}
-        drawn = {line: _drawn(line, numbers) for line, own in sides.items() if own}
         frames = {one & other for one, other in combinations(sides.values(), 2)} - {frozenset()}
+        drawn = {line: _drawn(line, numbers) for line, own in sides.items() if own and frames}
         best, saved = lines, 0
         for frame in sorted((tuple(sorted(frame, key=lambda side: BOX.index(side[0]))) for frame in frames), key=str):
             moved = changed_lines(sides, partial(_inside, frame=frame))

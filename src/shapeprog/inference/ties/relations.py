@@ -143,11 +143,12 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
         elif slot.kind == "angle" and slot.word != "step":
             yield Relation(eye[k], TIES.equal, limit=TIES.degrees)
     for (a, slot), (b, other) in combinations(enumerate(slots), 2):
-        if slot.kind != other.kind:
+        limit = TIES.degrees if slot.kind == "angle" else TIES.within
+        if slot.kind != other.kind or abs(numbers[a] - numbers[b]) > limit:
             continue
         larger, equal = max(numbers[a], numbers[b]), Relation(eye[a] - eye[b], TIES.equal)
         if slot.kind == "angle" and slot.word == other.word:
-            yield equal._replace(limit=TIES.degrees)
+            yield equal._replace(limit=limit)
         elif slot.kind == "clearance":
             corner = slot.line == other.line and {slot.axis, other.axis} == {0, 1}
             if corner and TIES.within < min(numbers[a], numbers[b]) and larger < TIES.section:

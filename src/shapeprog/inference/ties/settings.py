@@ -42,6 +42,7 @@ class TieSettings:
     section: float = 3.0  # sizes below this along different axes may be the two sides of one section
 
     # Costs of anchors
+    ahead: int = 16  # most elements whose anchors are tried at once
     separated: float = 5.0  # of a pair of parts that touch and would be separated
     touch: float = 0.12  # gap up to which they touch
     side: float = 2.0  # of a copy of a part near a side of the whole that does not move with it

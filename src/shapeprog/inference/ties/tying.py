@@ -83,15 +83,15 @@ def tie(
         assert tied.source is not None
         ties = _Ties(tied.source, evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
-        surface = cKDTree(evidence.surface, balanced_tree=False)  # faster to build
-        before = 0.0 if known else closeness(unroll(plain), surface, seed)
+        surface = None if known else cKDTree(evidence.surface, balanced_tree=False)  # faster to build
+        before = closeness(unroll(plain), surface, seed) if surface else 0.0
         least = math.inf
         for attempt in range(TIES.attempts):
             try:
                 offered = ties.tied(price / TIES.cheaper**attempt)
             except Fault:  # relations left a part without length
                 continue
-            lost = 0.0 if known else before - closeness(unroll(offered), surface, seed)
+            lost = before - closeness(unroll(offered), surface, seed) if surface else 0.0
             if lost < least:
                 tied, least = offered, lost
             if lost <= TIES.lost:
@@ -118,6 +118,7 @@ class _Ties:
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
         self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
+        self.zero = -1.0 if known else TIES.zero  # what somebody wrote stays
         self.joined = np.sort(np.array(layout.parts)[blocks[apart]], 1)  # the lines (C, 2) of each joint
         self.touching = set(map(tuple, self.joined.tolist()))
 
@@ -132,7 +133,8 @@ class _Ties:
             solution, values = self._solved(price)
             digits = (DEGREES if slots[k].kind == "angle" else self.decimals for k in solution.free)
             free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
-            zero = (np.abs(free) <= TIES.zero) & [slots[k].kind in DISTANCES for k in solution.free]
+            zero = (np.abs(free) <= self.zero) & [slots[k].kind in DISTANCES for k in solution.free]
+            zero &= ~self.fixed[solution.free]
             solution = Solution(solution.factors[:, ~zero], np.array(solution.free)[~zero].tolist())
             free = free[~zero]
             loose = self._loose(solution.factors @ free)

@@ -96,7 +96,7 @@ class Target:
         every, normals = np.concatenate([paired, drawn]), np.concatenate([facing[partner], normals])
         along = _dot(evidence.normals[every], normals)
         nearest = nearest_primitive(scene, torch.from_numpy(points))[0].numpy()
-        weights = np.array([1 / count, np.float32(0.5 / count), 0.03 / count])
+        weights = np.array([1 / count, 0.5 / count, 0.03 / count])
         fields = {
             "points": evidence.points[every],
             "samples": np.concatenate([samples[partner], points]),
@@ -122,8 +122,7 @@ class Target:
         away = evidence.points.take(points, 0) - places.take(samples, 0)
         plane, cosine = _dot(away, sides), _dot(normals, sides)
         spacing = 1.5 * math.sqrt(evidence.area / min(FIT.pairs, len(evidence.points)))
-        # The root of torch: the last digit of numpy's differs at times, and with it the best of two equal partners.
-        along = torch.from_numpy(np.maximum(_dot(away, away) - plane**2, 0)).sqrt().numpy() - spacing
+        along = np.sqrt(np.maximum(_dot(away, away) - plane**2, 0)) - spacing
         turned = np.where(evidence.outward[points] & (cosine < 0), NEVER, np.maximum(1 - cosine**2, 0))
         against = np.maximum(along, 0) ** 2 + FIT.turned**2 * np.where(self._known[points], turned, 0.0)
         best = np.arange(len(against)), (plane**2 + against).argmin(1)

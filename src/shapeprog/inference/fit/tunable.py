@@ -51,8 +51,7 @@ class Tunable:
     def __init__(self, program: Program) -> None:
         self.program = program
         nodes = list(program.walk())
-        code = encode(program, dtype=torch.float64)
-        self._code = code
+        self._code = code = encode(program, dtype=torch.float64)
         # Of every number (F) the index of its node in the order of the text, and its slot there.
         self.moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
         # The same program with the number of every value, from 1, in its place; 0 where it stays.

@@ -157,4 +157,5 @@ class _Contacts:
         pairs = [count * scene + slots[pair] for slots in (self.first, self.second)]
         graph = coo_array((np.ones(len(pair)), pairs), (count * len(kept),) * 2)
         _, labels = connected_components(graph, directed=False)
-        return np.array([len({*row}) for row in labels.reshape(-1, count).tolist()])
+        first = np.unique(labels, return_index=True)[1]  # every piece is in one scene
+        return np.bincount(first // count, minlength=len(kept))

@@ -638,12 +638,12 @@ def test_a_distance_that_rounds_to_zero_is_no_number(monkeypatch: pytest.MonkeyP
         values[[slots[k].kind == "clearance" for k in solution.free]] = 0.01
         return solution, values
 
-    before = tied_table()
+    before, known = tied_table(), tied_table(known=True)
     monkeypatch.setattr(tying, "carried", small)
     after = tied_table()
     assert free_numbers(after) < free_numbers(before)
     assert all(name.value for name in sp.names(after))
-    assert free_numbers(tied_table(known=True)) > free_numbers(after), "what somebody wrote stays"
+    assert free_numbers(tied_table(known=True)) == free_numbers(known), "what somebody wrote stays"
 
 
 @pytest.mark.parametrize("lap", [0.02, 0.1])

@@ -27,10 +27,10 @@ TOLERANCES = (0.015, 0.01, 0.004, 0.001)
 """How far a face may move, in cells; the smaller ones where parts come apart."""
 
 IN_CELLS = TOLERANCES[2:]
-"""The same for programs in cells."""
+"""The tolerances for programs in cells."""
 
-STEP = 1e-4  # change of a number, in cells, by which slopes are measured
-ROUNDING = 1e-6  # cells that float32 may add to a move
+STEP = 4e-3  # change of a number, in cells, by which slopes are measured
+ROUNDING = 1e-5  # cells that float32 may add to a move
 
 CELLS = "cells"
 """The word for lengths in cells of the grid."""
@@ -51,9 +51,9 @@ def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | Non
 def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     """The program with its lengths in a unit, or in cells, rounded as a person would.
 
-    No number and no face moves by more than .015 cells; where parts would come apart, by less.  A program of
-    more than 256 primitives is not rounded, and one in this unit is returned unchanged.  What ``in_unit`` refuses is
-    refused.
+    No number, and no face of the box around a part, moves by more than .015 cells; where parts would come apart, by
+    less.  A program of more than 256 primitives is not rounded, and one in this unit is returned unchanged.  What
+    ``in_unit`` refuses is refused.
     """
     if program.unit == unit:
         return program
@@ -61,7 +61,7 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     if not 0 < exact.size <= 256:  # rounding takes long for more primitives
         return exact
     loose = len(floating(program))
-    for tolerance in TOLERANCES if unit else IN_CELLS:
+    for tolerance in TOLERANCES if unit is not None else IN_CELLS:
         result = _rounded(exact, tolerance)
         if result is not None and len(floating(result)) <= loose:
             return result
@@ -69,26 +69,26 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
 
 
 def _rounded(program: Program, tolerance: float) -> Program | None:
-    """The program with rounded numbers; ``None`` if a face then moves farther than the tolerance.
+    """The program with rounded numbers; ``None`` if the box around a part then moves by more than the tolerance.
 
-    Moves are nearly linear in the numbers, so they are added up; what bars that are nearly upright do is not, so the
-    result is evaluated.
+    The moves are added up, as if they were linear in the numbers.  Those of nearly upright bars are not, so the result
+    is evaluated.
     """
     lengths, with_numbers = literal_lengths(program)
     per_cell = 1.0 if program.unit is None else program.unit.per_cell
     farthest, step = tolerance * per_cell, STEP * per_cell
-    changed = [with_numbers([*lengths[:k], length + step, *lengths[k + 1 :]]) for k, length in enumerate(lengths)]
-    before, *others = _faces([program, *changed])
-    slopes = [(faces - before) / step for faces in others]
-    numbers, moved = [*lengths], torch.zeros_like(before)
-    for share in (0.5, 1.0):  # of the tolerance: numbers that are nearly round go first
-        for k, length in enumerate(lengths):
-            for tried in _rounder(length, share * farthest):
-                then = moved + (tried - numbers[k]) * slopes[k]
-                if float(then.abs().max()) <= share * tolerance + ROUNDING:
-                    numbers[k], moved = tried, then
-                    break
     try:
+        changed = (with_numbers([*lengths[:k], length + step, *lengths[k + 1 :]]) for k, length in enumerate(lengths))
+        before, *others = _faces([program, *changed])
+        slopes = [(faces - before) / step for faces in others]
+        numbers, moved = [*lengths], torch.zeros_like(before)
+        for share in (0.5, 1.0):  # of the tolerance: numbers that are nearly round go first
+            for k, length in enumerate(lengths):
+                for tried in _rounder(length, share * farthest):
+                    then = moved + (tried - numbers[k]) * slopes[k]
+                    if float(then.abs().max()) <= share * tolerance + ROUNDING:
+                        numbers[k], moved = tried, then
+                        break
         result = with_numbers(numbers)
         (after,) = _faces([result])
     except ShapeProgError:  # something has no size any more

@@ -82,13 +82,13 @@ class Parts:
     def _main_surface(self) -> None:
         """Which parts are the main surface, and its bounds (3,)."""
         first, last = self.low.min(0), self.high.max(0)
-        level = np.abs(self.top[:, None] - self.top) <= self.near
+        alike = np.abs(self.top[:, None] - self.top) <= self.near
         area = np.where(self.lying, self.face, 0)
-        cover = level @ area  # how much is covered by what lies at about the height of each part
+        cover = alike @ area  # how much is covered by what lies at about the height of each part
         middle = (self.low + self.high - first - last) / 2
         central, together = (
             (off[:, DEPTH] <= 0.15 * self.size[DEPTH]) & (np.abs(off[:, SIDE]) <= self.size[SIDE] / 4)
-            for off in (middle, level @ (area[:, None] * middle) / np.maximum(cover, 1e-9)[:, None])
+            for off in (middle, alike @ (area[:, None] * middle) / np.maximum(cover, 1e-9)[:, None])
         )
         fitting = self.lying & central
         if not fitting.any():  # the seat of a corner sofa is several parts

@@ -255,9 +255,10 @@ def _kind(p: Parts) -> tuple[Rule, ...]:
     if (high & (p.rear > 0.1)).any():
         _, depth, side = p.size
         low = p.size[UP] < (0.6 if depth > side else 0.5) * depth
-        off = np.average((p.low + p.high - p.main_low - p.main_high)[p.main, SIDE], weights=p.face[p.main])
+        face, off = p.face[p.main], (p.low + p.high - p.main_low - p.main_high)[p.main, SIDE] / 2
         covered = (p.main_high - p.main_low)[DEPTH:].prod() >= 0.6 * depth * side
-        covered &= abs(off) <= 0.1 * side  # a corner sofa is wider on one side
+        covered &= face.sum() >= 0.3 * depth * side  # also by slats
+        covered &= abs(off @ face) <= 0.05 * side * face.sum()  # not by a corner sofa, which has more on one side
         return BED if low and covered and depth > 0.75 * side else SEATING
     arms = (p.low + p.high - p.main_low - p.main_high)[high & (p.aside > 0.3), SIDE]
     return SEATING if (arms < 0).any() and (arms > 0).any() and not p.cased else CASE

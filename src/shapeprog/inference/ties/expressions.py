@@ -144,7 +144,8 @@ class _Contacts:
             return []
         changes = np.multiply.outer(parts, np.subtract(TIES.changes, 1)).swapaxes(1, 2)  # (S, 2, P)
         changed = self.layout.values(self.numbers + changes.reshape(-1, changes.shape[-1]))
-        scenes = map(self.layout.tunable.scenes, changed.split(64))  # more may be more primitives than allowed
+        # One batch of all might have more primitives than ``unroll`` takes.
+        scenes = map(self.layout.tunable.scenes, changed.split(TIES.changed))
         kept = np.concatenate([gaps(boxes_of(scene), self.first, self.second) for scene in scenes]) < TIES.touch
         more = (self._pieces(kept) - self.pieces).reshape(len(parts), -1).sum(1).tolist()
         lines = self.line[np.stack([self.first, self.second])]
@@ -157,5 +158,5 @@ class _Contacts:
         pairs = [count * scene + slots[pair] for slots in (self.first, self.second)]
         graph = coo_array((np.ones(len(pair)), pairs), (count * len(kept),) * 2)
         _, labels = connected_components(graph, directed=False)
-        first = np.unique(labels, return_index=True)[1]  # every piece is in one scene
+        first = np.unique(labels, return_index=True)[1]  # the first part of every piece, which tells its scene
         return np.bincount(first // count, minlength=len(kept))

@@ -42,7 +42,6 @@ class TieSettings:
     section: float = 3.0  # sizes below this along different axes may be the two sides of one section
 
     # Costs of anchors
-    ahead: int = 16  # most elements whose anchors are tried at once
     separated: float = 5.0  # of a pair of parts that touch and would be separated
     touch: float = 0.12  # gap up to which they touch
     side: float = 2.0  # of a copy of a part near a side of the whole that does not move with it
@@ -67,6 +66,10 @@ class TieSettings:
     # Numbers that carry parts
     changes: tuple[float, ...] = (0.7, 1.4)  # what a name is multiplied by to see which parts it separates
     operations: int = 2  # most numbers that are measured from one
+
+    # Batches
+    ahead: int = 16  # most elements whose anchors are tried at once
+    changed: int = 64  # most changed programs that are drawn at once
 
     # Fit
     draws: int = 2  # times that pairs of points are drawn for one curvature

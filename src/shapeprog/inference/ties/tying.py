@@ -84,14 +84,14 @@ def tie(
         ties = _Ties(tied.source, evidence, seed, known=known, held=held)
         price *= TIES.known_price if known else TIES.price
         surface = None if known else cKDTree(evidence.surface, balanced_tree=False)  # faster to build
-        before = closeness(unroll(plain), surface, seed) if surface else 0.0
+        before = 0.0 if surface is None else closeness(unroll(plain), surface, seed)
         least = math.inf
         for attempt in range(TIES.attempts):
             try:
                 offered = ties.tied(price / TIES.cheaper**attempt)
             except Fault:  # relations left a part without length
                 continue
-            lost = before - closeness(unroll(offered), surface, seed) if surface else 0.0
+            lost = 0.0 if surface is None else before - closeness(unroll(offered), surface, seed)
             if lost < least:
                 tied, least = offered, lost
             if lost <= TIES.lost:
@@ -118,7 +118,7 @@ class _Ties:
         minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
         self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
-        self.zero = -1.0 if known else TIES.zero  # what somebody wrote stays
+        self.zero = 0.0 if known else TIES.zero  # a distance that somebody wrote stays
         self.joined = np.sort(np.array(layout.parts)[blocks[apart]], 1)  # the lines (C, 2) of each joint
         self.touching = set(map(tuple, self.joined.tolist()))
 

@@ -30,11 +30,8 @@ from shapeprog.language.free import numbers
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Node, Program
 
-MOST_CANDIDATES = 1_500
-"""Most candidates that are compared; half of them may be single blocks."""
-
-LEAST_GAIN = 0.0005
-"""Share of the surface from which another block is mentioned."""
+MOST_CANDIDATES = 1_500  # most candidates that are compared; half of them may be single blocks
+LEAST_GAIN = 0.0005  # share of the surface from which another block is mentioned
 
 
 class Assembly(NamedTuple):

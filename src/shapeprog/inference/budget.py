@@ -13,8 +13,7 @@ from dataclasses import dataclass
 Progress = Callable[[str, float], None]
 """Called with the name of the current step and the share of it that is done."""
 
-BUDGET = 60.0
-"""Seconds for one shape: some twenty times what the slowest of 182 validation shapes takes on one core."""
+BUDGET = 60.0  # seconds for one shape: some twenty times what the slowest of 182 validation shapes takes on one core
 
 
 @dataclass

@@ -29,14 +29,11 @@ from shapeprog.library.rewriting import within
 from shapeprog.library.store import Library
 from shapeprog.space import FloatArray
 
-LOOSE = 0.6
-"""Largest difference in cells between a number of a block and that of the call which replaces it."""
-
+LOOSE = 0.6  # largest difference in cells between a number of a block and that of the call which replaces it
 LOSS = 0.02
 """Largest loss of value by a call, as a share of the target: whoever gives functions wants to see them called."""
 
-OFFERED = 48
-"""Largest number of calls of one function that are compared: the nearest."""
+OFFERED = 48  # largest number of calls of one function that are compared: the nearest
 
 
 class Candidate(NamedTuple):

@@ -43,8 +43,7 @@ from shapeprog.language.unit import metres
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, joined, with_library
 
-SEARCH_SHARE = 0.65
-"""Share of the time budget after which the search on cells hands over to fitting."""
+SEARCH_SHARE = 0.65  # share of the time budget after which the search on cells hands over to fitting
 
 SURFACE_KERNELS = (
     "geometry/distance", "geometry/surface", "inference/choice/", "inference/pieces/", "inference/surface/",

@@ -23,17 +23,12 @@ from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import Plan
 
-TOLERANCES = (0.015, 0.01, 0.004, 0.001)
-"""How far a face may move, in cells; the smaller ones where parts come apart."""
-
-IN_CELLS = TOLERANCES[2:]
-"""The tolerances for programs in cells."""
-
+TOLERANCES = (0.015, 0.01, 0.004, 0.001)  # how far a face may move, in cells; the smaller ones where parts come apart
+IN_CELLS = TOLERANCES[2:]  # the tolerances for programs in cells
 STEP = 4e-3  # change of a number, in cells, by which slopes are measured
 ROUNDING = 1e-5  # cells that float32 may add to a move
 
-CELLS = "cells"
-"""The word for lengths in cells of the grid."""
+CELLS = "cells"  # the word for lengths in cells of the grid
 
 
 def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | None:

@@ -39,17 +39,10 @@ RADIUS = FIRST + 4  # of a disc
 TILT = FIRST + 6  # of a back
 COUNT1, SHIFT1, COUNT2, SHIFT2 = 8, 9, 12, 13
 
-WORDS = 512
-"""Words of 64 cells of the grid; as 1024 of 32, word 32 i + j holds the cells at height i and depth j."""
-
-MOST_MOVES = 80
-"""An upper bound on the number of neighbours of a block."""
-
-MOST_COPIES = 64
-"""Largest number of copies of one block."""
-
-GAIN = 1e-9
-"""Smallest increase of the objective that is accepted, above rounding errors."""
+WORDS = 512  # words of 64 cells of the grid; as 1024 of 32, word 32 i + j holds the cells at height i and depth j
+MOST_MOVES = 80  # an upper bound on the number of neighbours of a block
+MOST_COPIES = 64  # largest number of copies of one block
+GAIN = 1e-9  # smallest increase of the objective that is accepted, above rounding errors
 
 Words = npt.NDArray[np.uint64]
 

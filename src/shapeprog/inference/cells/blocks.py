@@ -10,8 +10,7 @@ from shapeprog.language.program import Draw, Loop, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.space import DEPTH, SIDE, FloatArray
 
-FORMS = {BOX: "locker", BACK: "back", DISC: "support_cylinder"}
-"""Statements of the paper that draw the forms."""
+FORMS = {BOX: "locker", BACK: "back", DISC: "support_cylinder"}  # statements of the paper that draw the forms
 
 BOXES = {
     "seat": "top_square", "top": "top_square", "cushion": "top_square", "mattress": "top_square",

@@ -20,9 +20,7 @@ from shapeprog.kernels.compile import helper, kernel
 
 MIRROR, PERIOD = 1, 2
 
-SLACK = 0.01
-"""Margin below the best at which a bound prunes: more than the rounding error of a sum in single precision."""
-
+SLACK = 0.01  # margin below the best at which a bound prunes: more than the rounding error of a sum in single precision
 SIDE = 32
 """Largest number of cells along a side of a volume; a limit of so many cells for the side of a box is no limit."""
 

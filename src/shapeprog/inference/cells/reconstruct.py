@@ -28,8 +28,7 @@ from shapeprog.inference.surface.evidence import Evidence, points_of_cells
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 
-REACH = 1.49
-"""Largest change of a parameter from a whole number, in cells: rounding and one step lead back."""
+REACH = 1.49  # largest change of a parameter from a whole number, in cells: rounding and one step lead back
 
 STEPS, DRAWN, RATE = 50, 1000, 0.12
 """Number of steps by the chamfer distance, points of the target and of the program that each draws, and length of the

@@ -13,8 +13,7 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.inference.choice.coverage_kernels import CELLS, cover
 from shapeprog.space import HALF, RESOLUTION, FloatArray
 
-WORD = 64
-"""Bits of a word."""
+WORD = 64  # bits of a word
 
 Bits = npt.NDArray[np.uint64]
 

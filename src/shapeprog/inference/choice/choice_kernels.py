@@ -13,8 +13,7 @@ RUIN_LEAST, RUIN_MOST = 0.1, 0.6
 THRESHOLD = 0.01
 """How much worse than the incumbent a set may be that takes its place; it falls to zero (Dueck and Scheuer 1990)."""
 
-BLINK = 0.05
-"""Probability with which a round overlooks a candidate (Christiaens and Vanden Berghe 2020)."""
+BLINK = 0.05  # probability with which a round overlooks a candidate (Christiaens and Vanden Berghe 2020)
 
 
 @helper

@@ -38,8 +38,7 @@ from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
 from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, Array, FloatArray
 
-AWAY = 4.0 * HALF
-"""A coordinate outside all candidates, by which unused samples of a word are known."""
+AWAY = 4.0 * HALF  # a coordinate outside all candidates, by which unused samples of a word are known
 
 
 @dataclass(frozen=True)

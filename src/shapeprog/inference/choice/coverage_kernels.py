@@ -13,14 +13,11 @@ from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.table import CENTRE, KIND, ROTATION, local, turned
 from shapeprog.space import HALF, RESOLUTION
 
-CELLS = 32
-"""Cells along each side of the grid that bins points."""
-
+CELLS = 32  # cells along each side of the grid that bins points
 LIFT = 1e-3
 """Offset in cells above a point at which the gradient of the distance is evaluated: on a surface it is undefined."""
 
-TURNED = 0.75
-"""Share of the price for surface that coincides with the target's but faces the other way."""
+TURNED = 0.75  # share of the price for surface that coincides with the target's but faces the other way
 
 
 @helper

@@ -27,8 +27,7 @@ from shapeprog.inference.fit.tunable import Poses
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.space import FloatArray
 
-NEVER = 1e9
-"""Penalty of a pair whose normals are known to face opposite ways."""
+NEVER = 1e9  # penalty of a pair whose normals are known to face opposite ways
 
 Indices = npt.NDArray[np.int64]
 Vectors = TypeVar("Vectors", FloatArray, Tensor)

@@ -22,9 +22,7 @@ from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import Plan
 from shapeprog.space import HALF
 
-THINNEST = 0.1
-"""Least thickness in cells of any part; the eye takes thinner ones for slivers."""
-
+THINNEST = 0.1  # least thickness in cells of any part; the eye takes thinner ones for slivers
 STEP = 1e-4
 """Step of differences in cells and degrees: primitives are linear or trigonometric in it, with errors below 1e-10."""
 

@@ -16,9 +16,7 @@ from shapeprog.inference.surface.cloud import spiral
 from shapeprog.inference.surface.components import IntArray
 from shapeprog.space import Array, FloatArray
 
-CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
-"""The corners (8, 3) of a box of half extents 1."""
-
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # the corners (8, 3) of a box of half extents 1
 LINES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]])
 """Directions along which boxes are compared."""
 

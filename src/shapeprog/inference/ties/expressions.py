@@ -29,9 +29,7 @@ ELIMINATED = {
 }  # fmt: skip
 """Which kinds of numbers rather follow from others: small ones first."""
 
-DISTANCES = "clearance", "offset"
-"""Kinds of numbers that are dropped near zero, and that may be measured from another."""
-
+DISTANCES = "clearance", "offset"  # kinds of numbers that are dropped near zero, and that may be measured from another
 NOTHING = 1e-7  # factors up to this are zero
 
 

@@ -12,7 +12,6 @@ import math
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
@@ -24,12 +23,12 @@ from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.choice.bits import nearby
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses
+from shapeprog.inference.surface.components import IntArray
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.space import FloatArray
 
 NEVER = 1e9  # penalty of a pair whose normals are known to face opposite ways
 
-Indices = npt.NDArray[np.int64]
 Vectors = TypeVar("Vectors", FloatArray, Tensor)
 
 
@@ -109,8 +108,8 @@ class Target:
         return Pairs(**{name: torch.from_numpy(values) for name, values in fields.items()})
 
     def _closest(
-        self, points: Indices, samples: Indices, places: FloatArray, facing: FloatArray
-    ) -> tuple[Indices, Indices, FloatArray]:
+        self, points: IntArray, samples: IntArray, places: FloatArray, facing: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray]:
         """The best of several pairs (R, k) of points and samples, of which one may be the same for all, and its squared
         penalty besides the distance along the normal.
 
@@ -162,7 +161,7 @@ def _joint(points: FloatArray, normals: FloatArray) -> FloatArray:
     return np.concatenate([points, FIT.turned / math.sqrt(2) * normals], 1)
 
 
-def _nearest(tree: cKDTree, points: FloatArray, normals: FloatArray) -> Indices:
+def _nearest(tree: cKDTree, points: FloatArray, normals: FloatArray) -> IntArray:
     """The nearest members (P, k) of a tree to points with normals."""
-    nearest: Indices = tree.query(_joint(points, normals), FIT.partners)[1]
+    nearest: IntArray = tree.query(_joint(points, normals), FIT.partners)[1]
     return nearest

@@ -253,12 +253,17 @@ def _kind(p: Parts) -> tuple[Rule, ...]:
         return CASE
     high = p.rising & (p.top >= p.main_high[UP] + 0.12 * p.size[UP])
     if (high & (p.rear > 0.1)).any():
-        _, depth, side = p.size
-        low = p.size[UP] < (0.6 if depth > side else 0.5) * depth
-        face, off = p.face[p.main], (p.low + p.high - p.main_low - p.main_high)[p.main, SIDE] / 2
-        covered = (p.main_high - p.main_low)[DEPTH:].prod() >= 0.6 * depth * side
-        covered &= face.sum() >= 0.3 * depth * side  # also by slats
-        covered &= abs(off @ face) <= 0.05 * side * face.sum()  # not by a corner sofa, which has more on one side
-        return BED if low and covered and depth > 0.75 * side else SEATING
+        return BED if _is_bed(p) else SEATING
     arms = (p.low + p.high - p.main_low - p.main_high)[high & (p.aside > 0.3), SIDE]
     return SEATING if (arms < 0).any() and (arms > 0).any() and not p.cased else CASE
+
+
+def _is_bed(p: Parts) -> bool:
+    """Whether a seat or a bed is a bed: low, not much wider than long, and covered by its main surface evenly."""
+    _, depth, side = p.size
+    low = p.size[UP] < (0.6 if depth > side else 0.5) * depth
+    face, off = p.face[p.main], (p.low + p.high - p.main_low - p.main_high)[p.main, SIDE] / 2
+    covered = (p.main_high - p.main_low)[DEPTH:].prod() >= 0.6 * depth * side
+    covered &= face.sum() >= 0.3 * depth * side  # also by slats
+    even = abs(off @ face) <= 0.05 * side * face.sum()  # a corner sofa has more on one side
+    return bool(low and covered and even and depth > 0.75 * side)

@@ -71,6 +71,14 @@ class Batch:
         """Half extents of the box around each primitive along the axes of the grid, with gradient."""
         return (self.rotation.abs() @ self.bounds[..., None])[..., 0]
 
+    @property
+    def volumes(self) -> Float[Tensor, "*batch N"]:
+        """Volume of each primitive, with gradient to sizes."""
+        volume = torch.zeros_like(self.centre[..., 0])
+        for kind in self.kinds:
+            volume = torch.where(self.mask & (self.kind == kind), primitives[kind].volume(self.size), volume)
+        return volume
+
     def __len__(self) -> int:
         return self.mask.shape[0]
 

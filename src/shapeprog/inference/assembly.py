@@ -23,6 +23,7 @@ from shapeprog.inference.choice.choice import choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable
 from shapeprog.inference.fit.adjustment import adjust, tidy
+from shapeprog.inference.fit.snapping import snapped
 from shapeprog.inference.pieces.pieces import Source, find_pieces
 from shapeprog.inference.roles.roles import in_order, separated, with_roles
 from shapeprog.inference.surface.evidence import Evidence
@@ -65,7 +66,7 @@ def assemble(
     report("finding structure", 1.0)
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
-    program = connected(_unharmed(adjusted, start, coverage), coverage)
+    program = connected(snapped(_unharmed(adjusted, start, coverage), evidence), coverage)
     program = tidy(canonical_side(simplest(program)))
     program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)

@@ -30,7 +30,7 @@ from shapeprog.inference.candidates.loops import mirrors
 from shapeprog.inference.choice.bits import WORD, BinnedPoints, Bits, by_word, covers, nearby, pack, sorted_by_cell
 from shapeprog.inference.choice.coverage_kernels import charged
 from shapeprog.inference.choice.settings import SETTINGS
-from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.surface.evidence import Evidence, off_parts
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Node, Program
@@ -135,7 +135,8 @@ class Coverage:
         agreement = max(evidence.agreement, SETTINGS.agreement)
         near, deeper = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
         _, free = covers(scene, self._free, evidence.tolerance)
-        parts, interior = pack(parts_drawn(scene, evidence)), np.concatenate([interior, deeper], 1)
+        parts = pack(np.any(off_parts(scene, evidence) <= evidence.tolerance, 1))
+        interior = np.concatenate([interior, deeper], 1)
         covered = np.concatenate([np.concatenate([explained, near], 1) & ~interior, free, parts], 1)
         points, owners, areas = unsupported(scene, evidence, self._surface)
         number = np.bincount(owners, minlength=len(candidates))[:, None]
@@ -183,16 +184,6 @@ def protrusion(scene: Scene, evidence: Evidence) -> FloatArray:
     low, high = evidence.surface.min(0), evidence.surface.max(0)
     beyond = np.maximum(low - (centre - reach), centre + reach - high).max(2)
     return np.where(scene.mask, beyond, 0.0).max(1, initial=0.0)
-
-
-def parts_drawn(scene: Scene, evidence: Evidence) -> npt.NDArray[np.bool_]:
-    """Which parts of a mesh (B, K) each candidate draws: a primitive has the same box, up to the tolerance."""
-    low, high = ((scene.centre + sign * scene.reach).numpy() for sign in (-1, 1))
-    result = np.zeros((len(low), len(evidence.parts)), np.bool_)
-    for k, mask in enumerate(scene.mask.numpy().T):
-        boxes = np.stack([low[mask, k], high[mask, k]], 1)[:, None]
-        result[mask] |= (np.abs(boxes - evidence.parts) <= evidence.tolerance).all((2, 3))
-    return result
 
 
 def free_points(evidence: Evidence) -> tuple[FloatArray, float]:

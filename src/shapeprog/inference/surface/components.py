@@ -106,13 +106,13 @@ def solid_sides(mesh: Components, volume: FloatArray) -> IntArray:
     return np.repeat(sign, np.diff(mesh.start))
 
 
-def simple_parts(mesh: Components, volume: FloatArray, seen: IntArray) -> FloatArray:
-    """Low and high corners (K, 2, 3) of the boxes of closed components with a visible face that fill most of their box;
-    ``seen`` are the indices of visible faces, and ``volume`` is what the components enclose, NaN if they are open."""
+def boxes_of(mesh: Components, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Low and high corners (G, 2, 3) of the boxes of components along the axes of the grid, and which share (G,) of its
+    box each fills; ``volume`` is what the components enclose, and they fill 0 if they are open."""
     corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
     low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
-    simple = np.abs(volume) >= 0.5 * (high - low).prod(1)  # a ball fills .52 of its box
-    return np.stack([low, high], 1)[simple & np.isin(np.arange(len(first)), mesh.component_of(seen))]
+    fill = np.abs(volume) / np.maximum((high - low).prod(1), 1e-9)
+    return np.stack([low, high], 1), np.nan_to_num(fill)
 
 
 def enclosed(mesh: Components) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -14,9 +14,10 @@ from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.arrays import over_threads
 from shapeprog.geometry.mesh import triangle_normals, union_mesh
+from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
-from shapeprog.inference.surface.components import Components, IntArray, components, enclosed, simple_parts, solid_sides
+from shapeprog.inference.surface.components import Components, IntArray, boxes_of, components, enclosed, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
@@ -42,7 +43,9 @@ class Evidence:
     reach: float  # distance within which one of these points supports a surface
     area: float  # of the surface that the points represent, in proportion to their weights, in square cells
     free: Flags  # cells (R, R, R) of the grid that are known to be free; without meaning outside the box of the surface
-    parts: FloatArray  # low and high corners (K, 2, 3) of the boxes of the 64 largest simple components; none of scans
+    # Low and high corners of the boxes of the largest closed components that fill most of their box, and which share.
+    parts: FloatArray = field(default_factory=lambda: np.zeros((0, 2, 3)))  # (K, 2, 3)
+    part_fill: FloatArray = field(default_factory=lambda: np.zeros(0))  # (K,)
     mesh: Components | None = None  # the components of the target, if it is a mesh
 
 
@@ -55,6 +58,20 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
     if shape.points is not None and len(shape.points) > SURFACE.planes:
         return _of_points(points_of_scan(shape), shape.voxels, seed)
     return _of_cells(shape.voxels)
+
+
+def off_parts(scene: Scene, evidence: Evidence) -> FloatArray:
+    """How far the faces of the box around each primitive are at most from those of each part of a mesh (..., N, K), in
+    cells; infinitely if the two do not fill the same share of their boxes."""
+    middle, half, mask = scene.centre.numpy(), scene.reach.numpy(), scene.mask.numpy()
+    corners = np.stack([middle - half, middle + half], -2)
+    fill = scene.volumes.numpy() / np.maximum((2 * half).prod(-1), 1e-9)
+    alike = np.abs(fill[..., None] - evidence.part_fill) <= SURFACE.off_fill
+    result = np.full((*mask.shape, len(evidence.parts)), np.inf)
+    for k in range(mask.shape[-1]):  # all slots at once take much memory
+        off = np.abs(corners[..., k, None, :, :] - evidence.parts).max((-2, -1))
+        result[..., k, :] = np.where(alike[..., k, :] & mask[..., k, None], off, np.inf)
+    return result
 
 
 def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
@@ -73,9 +90,16 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
     mark_triangles(np.ascontiguousarray((corners + HALF) * (SURFACE.looking / RESOLUTION)), 0.5 + 1e-6, barrier)
     points, facing = surface[: SURFACE.points], normals[: SURFACE.points]
-    front, back = (_visible(points, side, barrier) for side in (facing, -facing))
+    boxes, fill = boxes_of(mesh, volume)
+    # Thin solids are no obstacle here; boxes hide what is inside of them and what touches them all the same.
+    solid = boxes[np.abs(fill - 1) < SURFACE.off_box][: SURFACE.parts]
+    front, back = (
+        _visible(points, side, barrier) & ~_in_boxes(points + SURFACE.above * side, solid) for side in (facing, -facing)
+    )
     weights = np.where(front | back, 1.0, 0.1)  # what cannot be seen from outside counts little
     facing, oriented = _turned_outward(facing, front, back)
+    seen = np.isin(np.arange(len(fill)), mesh.component_of(face[: SURFACE.points][front | back]))
+    simple = np.flatnonzero(seen & (fill >= SURFACE.simple))[: SURFACE.parts]
     area = float(mesh.area.sum())
     coarse: Flags = barrier.reshape((SURFACE.free, SURFACE.looking // SURFACE.free) * 3)
     for axis in range(1, 4):  # faster than all at once
@@ -84,7 +108,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
         surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
         area * float(weights.mean()), _free_cells(coarse, surface, through=False),
-        simple_parts(mesh, volume, face[: SURFACE.points][front | back])[:64], mesh,
+        boxes[simple], fill[simple], mesh,
     )  # fmt: skip
 
 
@@ -104,7 +128,7 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     facing, oriented = _turned_outward(facing, _within(free, points + above), _within(free, points - above))
     return Evidence(
         points, facing, np.full(len(points), 1 / len(points)), oriented, tolerance, SURFACE.scanned, surface, normals,
-        np.zeros(len(surface), np.bool_), _reach(tolerance, area, len(surface)), area, free, np.zeros((0, 2, 3)),
+        np.zeros(len(surface), np.bool_), _reach(tolerance, area, len(surface)), area, free,
     )  # fmt: skip
 
 
@@ -121,7 +145,7 @@ def _of_cells(voxels: Flags) -> Evidence:
     return Evidence(
         surface, normals, np.full(count, 1 / count), np.ones(count, np.bool_),
         SURFACE.cell_tolerance, SURFACE.agreement, surface, normals, np.zeros(count, np.bool_),
-        _reach(SURFACE.cell_tolerance, count, count), float(count), ~voxels, np.zeros((0, 2, 3)),
+        _reach(SURFACE.cell_tolerance, count, count), float(count), ~voxels,
     )  # fmt: skip
 
 
@@ -163,6 +187,14 @@ def _visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
     offset = normals / np.maximum(np.abs(normals).max(1, keepdims=True), 1e-9)
     starts = (points + HALF) * scale + 1.5 * offset  # out of the cells that the surface itself touches
     return looking(barrier, starts, directions(), 1, through=False)
+
+
+def _in_boxes(points: FloatArray, boxes: FloatArray) -> Flags:
+    """Whether points (P, 3) lie in one of some boxes (K, 2, 3)."""
+    inside = np.zeros(len(points), np.bool_)
+    for low, high in boxes:
+        inside |= ((points > low) & (points < high)).all(1)
+    return inside
 
 
 def _turned_outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray, Flags]:

@@ -26,6 +26,11 @@ class SurfaceSettings:
     planes: int = 16  # points of a scan to which a plane is fitted
     looking: int = 128  # cells along each side of the grid for visibility
     free: int = 64  # cells along each side of the grid of free space
+    parts: int = 64  # components of a mesh that are compared with parts, the largest
+    simple: float = 0.5  # least share of its box that such a component fills: a ball fills .52
+    off_box: float = 0.01  # difference of that share from one up to which it is a box
+    off_fill: float = 0.1  # difference of the shares of their boxes that a component and a primitive on it fill
+    above: float = 0.01  # height above a face at which something in contact with it hides it
     nearest: int = 12  # neighbours of a point
     around: int = 20  # neighbours from which a normal is estimated
     noisy: float = 0.05  # noise above which points are projected onto planes, and normals are less reliable

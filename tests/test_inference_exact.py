@@ -1,0 +1,73 @@
+"""Meshes of separate closed parts: their components are known exactly, and so are the numbers of the program."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shapeprog.data.placement import shape_from_mesh
+from shapeprog.data.shape import Shape
+from shapeprog.formats.parts import parts
+from shapeprog.inference.fit.snapping import snapped
+from shapeprog.inference.surface.evidence import evidence_of, off_parts
+from shapeprog.language.parser import parse
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
+
+
+def apart(text: str) -> Shape:
+    """A program as a mesh with a closed component for each of its parts."""
+    meshes = [(part.vertices, part.faces) for part in parts(parse(text))]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
+    faces = [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
+    return shape_from_mesh(np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces), axes=np.eye(3))
+
+
+def values(program: Program) -> list[list[float]]:
+    """The values of all drawing statements and loops."""
+    return [list(node.values) for node in program.walk()]
+
+
+def test_a_part_is_drawn_on_its_component_and_a_row_ends_at_one():
+    given = """\
+box(at=(11, -6, -8), size=(1, 12, 16))
+for i in translate(3, by=(0, 0, 7)):
+    box(at=(-12, -6, -8), size=(23, 12, 2))
+"""
+    fitted = """\
+box(at=(10.9, -5.8, -8), size=(1.2, 11.9, 16.1))
+for i in translate(3, by=(0, 0, 6.9)):
+    box(at=(-11.9, -6, -8.2), size=(23, 12.2, 2.1))
+"""
+    evidence = evidence_of(apart(given))
+    assert float(off_parts(unroll(parse(fitted)), evidence).min(-1).max()) > 0.15
+    assert np.allclose(np.concatenate(values(snapped(parse(fitted), evidence))), np.concatenate(values(parse(given))))
+
+
+@pytest.mark.parametrize(
+    "draw", ["cylinder(at=(-6, 0, 0), height=12, radius=2)", "bar(start=(-6, 0, 0), end=(6, 0.4, 0), section=(4, 4))"]
+)
+def test_what_is_round_or_leans_is_not_drawn_on_a_box(draw: str):
+    program = parse(draw)
+    assert snapped(program, evidence_of(apart("box(at=(-6, -2, -2), size=(12, 4, 4))"))) == program
+
+
+def test_a_round_part_is_not_on_a_square_one_of_the_same_box():
+    evidence = evidence_of(apart("box(at=(-12, -2, -2), size=(24, 4, 4))"))
+    square, round_ = (unroll(parse(text)) for text in (
+        "box(at=(-12, -2, -2), size=(24, 4, 4))", "cylinder(at=(-12, 0, 0), height=24, radius=2)"
+    ))  # fmt: skip
+    assert off_parts(square, evidence).item() < 1e-5
+    assert off_parts(round_, evidence).item() == np.inf
+
+
+def test_a_face_is_hidden_by_a_thin_board_that_touches_it():
+    # The board is .2 cells thick, less than rays start above a face.
+    evidence = evidence_of(
+        apart("box(at=(-12, -6, -6), size=(24, 12, 12))\nbox(at=(-11, -6.2, -5), size=(22, 0.2, 10))")
+    )
+    points = evidence.points - [0, evidence.surface[:, 1].min(), 0]
+    facing = (np.abs(evidence.normals[:, 1]) > 0.9) & (np.abs(points[:, [0, 2]]) < [10.9, 4.9]).all(1)
+    between, outside = (facing & (np.abs(points[:, 1] - depth) < 0.01) for depth in (0.2, 0.0))
+    assert min(between.sum(), outside.sum()) > 100
+    assert evidence.weights[between].max() < evidence.weights[outside].min() / 5

@@ -5,14 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import parts
 from shapeprog.inference.fit.snapping import snapped
-from shapeprog.inference.surface.evidence import evidence_of, off_parts
+from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program, off_parts
+from shapeprog.inference.ties.tying import tie
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
+
+CARCASS = """\
+# unit: mm
+width, depth, height = 800, 350, 600
+top_thickness, thickness = 22, 18
+top(top=0, height=top_thickness)
+with inside(top=top_thickness):
+    for _ in mirror(x=0):
+        side(left=0, width=thickness)
+    with inside(left=thickness, right=thickness):
+        shelf(bottom=40, height=thickness)
+        shelf(bottom=310, height=thickness)
+"""
 
 
 def apart(text: str) -> Shape:
@@ -26,6 +41,12 @@ def apart(text: str) -> Shape:
 def values(program: Program) -> list[list[float]]:
     """The values of all drawing statements and loops."""
     return [list(node.values) for node in program.walk()]
+
+
+def test_boards_of_two_thicknesses_keep_them_and_the_whole_its_size():
+    program = sp.infer(apart(CARCASS), unit="mm").program  # 24 cells are 240 mm
+    found = {name.name: round(name.value / 0.3, 1) for name in sp.names(program)}
+    assert found == {"width": 800, "depth": 350, "height": 600, "top_thickness": 22, "thickness": 18}
 
 
 def test_a_part_is_drawn_on_its_component_and_a_row_ends_at_one():
@@ -71,3 +92,9 @@ def test_a_face_is_hidden_by_a_thin_board_that_touches_it():
     between, outside = (facing & (np.abs(points[:, 1] - depth) < 0.01) for depth in (0.2, 0.0))
     assert min(between.sum(), outside.sum()) > 100
     assert evidence.weights[between].max() < evidence.weights[outside].min() / 5
+
+
+def test_numbers_of_a_union_are_not_exact():
+    program = parse("box(at=(0, -4, -4), size=(8, 8, 8))\nrod(start=(-9, 0, 0), end=(7.7, 0, 0), radius=1)\n")
+    rod = next(node for node in tie(program, evidence_of_program(program)).walk() if node.name == "rod")
+    assert abs(rod.values[3] - 8) < 0.1

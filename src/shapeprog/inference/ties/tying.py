@@ -22,7 +22,7 @@ from shapeprog.inference.budget import Progress
 from shapeprog.inference.candidates.drawings import solid_boxes
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.fit.tunable import CELLS, DEGREES
-from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.surface.evidence import Evidence, off_parts
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import DISTANCES, Solution, carried, solved
 from shapeprog.inference.ties.layout import Layout
@@ -62,7 +62,8 @@ def tie(
     evidence
         The target, which limits how far relations may move its parts.
     price
-        Price of a free number, as a multiple of ``price``, or ``known_price`` if the numbers are known.
+        Price of a free number, as a multiple of ``TIES.price``, or of ``TIES.known_price`` where numbers are known, or
+        exact.
     known
         Whether somebody wrote the numbers: they are then known, and not only where the surface is.
     floor
@@ -82,7 +83,7 @@ def tie(
             return program
         assert tied.source is not None
         ties = _Ties(tied.source, evidence, seed, known=known, held=held)
-        price *= TIES.known_price if known else TIES.price
+        price *= ties.price
         surface = None if known else cKDTree(evidence.surface, balanced_tree=False)  # faster to build
         before = 0.0 if surface is None else closeness(unroll(plain), surface, seed)
         least = math.inf
@@ -115,12 +116,27 @@ class _Ties:
         self.layout = layout = Layout(source, anchors_of(flat), divide=not held)
         top = [index for index, line in enumerate(layout.body) for _ in Source((line,)).walk()]
         self.fixed = np.array([slot.line >= 0 and top[slot.line] in held for slot in layout.slots])
-        minimum = np.where(self.fixed, 1e6, TIES.known if known else 0.0)
+        self.joined = np.sort(np.array(layout.parts)[blocks[apart]], 1)  # the lines (C, 2) of each joint
+        self.touching = set(map(tuple, self.joined.tolist()))
+        self.related = relations(layout, layout.numbers, self.touching)  # at the start
+        exact = not known and self._is_exact(evidence)
+        self.price = TIES.known_price if known or exact else TIES.price
+        weight = TIES.known if known else TIES.exact if exact else 0.0
+        minimum = np.where(self.fixed, 1e6, weight)
         self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
         self.zero = 0.0 if known else TIES.zero  # a distance that somebody wrote stays
-        self.joined = np.sort(np.array(layout.parts)[blocks[apart]], 1)  # the lines (C, 2) of each joint
-        self.touching = set(map(tuple, self.joined.tolist()))
+
+    def _is_exact(self, evidence: Evidence) -> bool:
+        """Whether relations that nearly hold mostly hold exactly, as in a drawing by CAD, and parts are components.
+
+        In other models, and where numbers are fitted, deviations are random.
+        """
+        numbers, scene = self.layout.numbers, self.layout.scene(self.layout.numbers)
+        on = off_parts(scene, evidence).min(-1, initial=np.inf) <= TIES.component
+        off = np.array([abs(each.row @ numbers) / np.abs(each.row).max() for each in self.related])
+        exactly, nearly = (np.count_nonzero(off < limit) for limit in (TIES.exactly, TIES.nearly))
+        return bool(exactly > TIES.exact_share * nearly and on.mean() > TIES.component_share)
 
     def tied(self, price: float) -> Program:
         """The program tied at a price of a number, in the unit of the misfit.
@@ -154,7 +170,7 @@ class _Ties:
         numbers, rows = self.layout.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
             candidates = [
-                relation for relation in relations(self.layout, numbers, self.touching)
+                relation for relation in (relations(self.layout, numbers, self.touching) if step else self.related)
                 if not relation.row[self.fixed].any() and (step > 0 or relation.trust in (TIES.contact, TIES.floor))
             ]  # fmt: skip
             candidates, before = [*(Relation(row, math.inf) for row in rows), *candidates], len(rows)

@@ -49,6 +49,16 @@ def test_boards_of_two_thicknesses_keep_them_and_the_whole_its_size():
     assert found == {"width": 800, "depth": 350, "height": 600, "top_thickness": 22, "thickness": 18}
 
 
+def test_the_whole_is_as_large_as_the_mesh_though_a_tie_would_move_it():
+    # Equal clearances would be .05 cells off, which the width could give.
+    boards = "box(at=(-12, -5, -11), size=(22, 10, 2))\nbox(at=(-12, -5, 8.9), size=(22, 10, 2))\n"
+    text = "box(at=(10, -6, -12), size=(2, 12, 24))\n" + boards
+    program = tie(parse(text), evidence_of(apart(text)))
+    sizes = {name.name: name.value for name in sp.names(program)}
+    assert abs(sizes["width"] - 24) < 0.01
+    assert abs(sizes["height"] - 24) < 0.01
+
+
 def test_a_part_is_drawn_on_its_component_and_a_row_ends_at_one():
     given = """\
 box(at=(11, -6, -8), size=(1, 12, 16))

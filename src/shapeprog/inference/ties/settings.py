@@ -16,7 +16,8 @@ class TieSettings:
     price: float = 3e-4  # of a free number, as a mean squared distance
     known_price: float = 1.2e-3  # the same in a program that somebody wrote (planted programs), and of exact numbers
     known: float = 0.1  # weight of a squared move of a number that somebody wrote
-    exact: float = 1.0  # the same of exact numbers, where
+    extent: float = 0.3  # the same of the width, depth and height of a mesh from its own
+    exact: float = 1.0  # the same of exact numbers: those of a program where
     exactly: float = 0.005  # relations hold up to this
     nearly: float = 0.1  # for this share of all that hold up to this,
     exact_share: float = 0.45

@@ -122,8 +122,12 @@ class _Ties:
         exact = not known and self._is_exact(evidence)
         self.price = TIES.known_price if known or exact else TIES.price
         weight = TIES.known if known else TIES.exact if exact else 0.0
-        minimum = np.where(self.fixed, 1e6, weight)
-        self.misfit = Misfit(layout, evidence, joints, minimum, seed)
+        minimum, start = np.where(self.fixed, 1e6, weight), layout.numbers.copy()
+        if evidence.mesh is not None and not known:  # the size of a mesh is exact
+            size = np.ptp(evidence.mesh.vertices, 0)[::-1]
+            start[:3] = np.where(np.abs(size - start[:3]) < TIES.within, size, start[:3])
+            minimum[:3] = np.maximum(minimum[:3], TIES.extent)
+        self.misfit = Misfit(layout, evidence, joints, start, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
         self.zero = 0.0 if known else TIES.zero  # a distance that somebody wrote stays
 

@@ -75,6 +75,12 @@ for i in translate(3, by=(0, 0, 6.9)):
     assert np.allclose(np.concatenate(values(snapped(parse(fitted), evidence))), np.concatenate(values(parse(given))))
 
 
+def test_copies_near_one_component_stay_apart():
+    row = parse("for i in translate(2, by=(0, 0, 0.4)):\n    box(at=(-12, -6, -6.2), size=(24, 12, 12))\n")
+    found = snapped(row, evidence_of(apart("box(at=(-12, -6, -6), size=(24, 12, 12))")))
+    assert values(found)[0] == values(row)[0]
+
+
 @pytest.mark.parametrize(
     "draw", ["cylinder(at=(-6, 0, 0), height=12, radius=2)", "bar(start=(-6, 0, 0), end=(6, 0.4, 0), section=(4, 4))"]
 )

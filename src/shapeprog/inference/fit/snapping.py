@@ -20,7 +20,7 @@ def snapped(program: Program, evidence: Evidence) -> Program:
 
     A copy lies on a component if no face of the box around it is farther off than ``FIT.component``.  The first copy of
     a block is drawn anew on its component, if its statement draws such boxes in one way; rows end at that of their last
-    copy.
+    copy, if it is another.
     """
     if not program.size or not len(evidence.parts):
         return program
@@ -42,7 +42,8 @@ def snapped(program: Program, evidence: Evidence) -> Program:
         for level, loop in enumerate(loops):
             copies //= loop.count
             last = slots[copies * (loop.count - 1)]
-            if loop.name == "translate" and on[row, last]:
+            other = nearest[row, last] != nearest[row, first]  # copies within .5 cells may be near the same component
+            if loop.name == "translate" and on[row, last] and other:
                 way = (middle[row, last] - middle[row, first]) / max(loop.count - 1, 1)
                 step = np.where(np.array(loop.values[1:]) == 0, 0.0, way)
                 loops[level] = replace(loop, values=loop_values(loop.count, *step.tolist()))

@@ -15,7 +15,6 @@ import torch
 
 from shapeprog.evaluation.likeness import Triangles
 from shapeprog.geometry.distance import each_distance
-from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.language.hints import Box
 
@@ -48,10 +47,7 @@ def oriented_box(part: Triangles) -> Box:
 def overlaps(parts: Sequence[Box], scene: Scene, seed: int = 0) -> npt.NDArray[np.float64]:
     """IoU (parts, primitives) of boxes with the primitives of one scene, by sampling the boxes."""
     slots = scene.mask.nonzero()[:, 0]
-    volume = torch.zeros(len(scene.mask), dtype=torch.float64)
-    for kind in scene.kinds:
-        of_kind = scene.mask & (scene.kind == kind)
-        volume[of_kind] = primitives[kind].volume(scene.size[of_kind].double())
+    volume = scene.volumes[slots].double().numpy()
     sampled = np.random.default_rng(seed).uniform(-1, 1, (POINTS, 3))
     table = np.zeros((len(parts), len(slots)))
     for row, part in enumerate(parts):
@@ -59,7 +55,7 @@ def overlaps(parts: Sequence[Box], scene: Scene, seed: int = 0) -> npt.NDArray[n
         inside = (each_distance(scene, points.to(scene.size.dtype)) <= 0).double().mean(0)[slots].numpy()
         box_volume = float(np.prod(2 * part.half))
         shared = inside * box_volume
-        table[row] = shared / np.maximum(box_volume + volume[slots].numpy() - shared, 1e-12)
+        table[row] = shared / np.maximum(box_volume + volume - shared, 1e-12)
     return table
 
 

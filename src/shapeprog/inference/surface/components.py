@@ -106,7 +106,7 @@ def solid_sides(mesh: Components, volume: FloatArray) -> IntArray:
     return np.repeat(sign, np.diff(mesh.start))
 
 
-def boxes_of(mesh: Components, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
+def part_boxes(mesh: Components, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Low and high corners (G, 2, 3) of the boxes of components along the axes of the grid, and which share (G,) of its
     box each fills; ``volume`` is what the components enclose, and they fill 0 if they are open."""
     corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]

@@ -17,7 +17,7 @@ from shapeprog.geometry.mesh import triangle_normals, union_mesh
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
-from shapeprog.inference.surface.components import Components, IntArray, boxes_of, components, enclosed, solid_sides
+from shapeprog.inference.surface.components import Components, IntArray, components, enclosed, part_boxes, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
@@ -66,11 +66,10 @@ def off_parts(scene: Scene, evidence: Evidence) -> FloatArray:
     middle, half, mask = scene.centre.numpy(), scene.reach.numpy(), scene.mask.numpy()
     corners = np.stack([middle - half, middle + half], -2)
     fill = scene.volumes.numpy() / np.maximum((2 * half).prod(-1), 1e-9)
-    alike = np.abs(fill[..., None] - evidence.part_fill) <= SURFACE.off_fill
     result = np.full((*mask.shape, len(evidence.parts)), np.inf)
-    for k in range(mask.shape[-1]):  # all slots at once take much memory
-        off = np.abs(corners[..., k, None, :, :] - evidence.parts).max((-2, -1))
-        result[..., k, :] = np.where(alike[..., k, :] & mask[..., k, None], off, np.inf)
+    for k, (part, share) in enumerate(zip(evidence.parts, evidence.part_fill, strict=True)):
+        alike = mask & (np.abs(fill - share) <= SURFACE.off_fill)  # few: most slots of a batch are empty
+        result[alike, k] = np.abs(corners[alike] - part).max((1, 2))
     return result
 
 
@@ -90,7 +89,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
     mark_triangles(np.ascontiguousarray((corners + HALF) * (SURFACE.looking / RESOLUTION)), 0.5 + 1e-6, barrier)
     points, facing = surface[: SURFACE.points], normals[: SURFACE.points]
-    boxes, fill = boxes_of(mesh, volume)
+    boxes, fill = part_boxes(mesh, volume)
     # Thin solids are no obstacle here; boxes hide what is inside of them and what touches them all the same.
     solid = boxes[np.abs(fill - 1) < SURFACE.off_box][: SURFACE.parts]
     front, back = (

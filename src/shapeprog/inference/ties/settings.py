@@ -16,13 +16,18 @@ class TieSettings:
     price: float = 3e-4  # of a free number, as a mean squared distance
     known_price: float = 1.2e-3  # the same in a program that somebody wrote (planted programs), and of exact numbers
     known: float = 0.1  # weight of a squared move of a number that somebody wrote
-    extent: float = 0.3  # the same of the width, depth and height of a mesh from its own
-    exact: float = 1.0  # the same of exact numbers: those of a program where
-    exactly: float = 0.005  # relations hold up to this
-    nearly: float = 0.1  # for this share of all that hold up to this,
+    extent: float = 0.3  # weight of a squared move of the width, depth or height from that of the mesh
+    exact: float = 1.0  # weight of a squared move of a number in an exact program
+
+    # A program is exact if of the relations that hold up to ``nearly`` this share holds up to ``exactly``, and this
+    # share of its parts lies within ``component`` of a component of the mesh
+    nearly: float = 0.1
+    exactly: float = 0.005
     exact_share: float = 0.45
-    component: float = 0.02  # and parts lie on components of a mesh, up to this distance,
-    component_share: float = 0.25  # for this share of all parts
+    component: float = 0.02
+    component_share: float = 0.25
+
+    # Rounds
     rounds: int = 3  # most searches for relations: first contacts and parts on the floor, then all
     lost: float = 0.03  # largest decrease of closeness when numbers are tied
     cheaper: float = 3.0  # divides the price of a number where more is lost

@@ -14,9 +14,9 @@ from shapeprog.inference.candidates.neighbours import neighbours
 from shapeprog.inference.choice.choice import choose
 from shapeprog.inference.choice.connecting import connected, floating
 from shapeprog.inference.choice.coverage import Coverage
-from shapeprog.inference.fit.adjustment import adjust, tidy
+from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
-from shapeprog.language import Draw, Loop, Program
+from shapeprog.language import Loop, Program
 from shapeprog.language.hints import Box
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Node
@@ -161,12 +161,6 @@ def test_closing_a_gap_does_not_move_what_the_target_holds():
     apart = SEAT + "box(at=(3.25, -8, -12), size=(1, 16, 24))\nbox(at=(-12, -1, -1), size=(14, 2, 2))\n"
     found = unroll(adjust(parse(apart), evidence(apart))).centre
     assert (found - unroll(parse(apart)).centre).abs().max() < 0.1
-
-
-def test_tidy_numbers_have_two_decimals_and_angles_one():
-    node = Draw("board", (2.123456, -8.0, -12.0, 1.0004, 16.0, 24.0, 12.3456))
-    assert tidy(Program((node,))) == parse("board(at=(2.12, -8, -12), size=(1, 16, 24), tilt=12.3)")
-    assert tidy(Program()) == Program()
 
 
 def test_parts_of_one_size_at_equal_steps_are_one_row_whatever_draws_them():

@@ -673,6 +673,16 @@ def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tu
     assert found[1, "", 0] == (2, 2)
 
 
+def test_a_symmetric_rod_goes_with_the_parts_that_it_joins():
+    legs = "for _ in mirror(x=0):\n    leg({}, width=1, y=0, depth=1)\n"
+    rod = "stretcher(rod(start=at(x=-4.5, y=0.3, bottom=2), end=at(x=4.5), radius=0.4))\n"
+    found = []
+    for place in ("left=6.5", "left=0"):
+        text = f"width, depth, height = 24, 6, 8\ntop(top=0, height=1)\n{legs.format(place)}{rod}"
+        found.append(anchors_of(Layout(placed(sp.parse(text)).source)))
+    assert [(of[3, "start", 0], of[3, "end", 0]) for of in found] == [((0,), (2,)), ((1,), (1,))]
+
+
 def test_a_round_part_that_fills_the_whole_gives_it_one_diameter():
     text = tied_text("width, depth, height = 20, 20.1, 14\ntop(cylinder(width=20, top=0, height=1))\n"
                      "pedestal(cylinder(width=3, top=1))\n")  # fmt: skip
@@ -734,6 +744,7 @@ DOORS = f"for _ in mirror({{}}):\n{HANDLE}    door({{}}, front=0, depth=3)\n"
             ROW.format(7).replace("right=1", "right=1, rear=8.95"),
             "divide(3, x, gap=0.5, left=drawer_inset, right=drawer_inset",
         ),
+        (ROW.format(7) + HANDLE.replace("9", "5"), "divide(3, x, gap=0.5, left=drawer_inset, right=drawer_inset"),
         (ROW.format(7.15), "divide(3, x, gap=0.27, left=drawer_inset, right=drawer_inset"),
         (ROW.format(7).replace("row(3, last=at(right=1))", "translate(1, x=5)"), "drawer(left="),
         (ROW.format(3), "row(3, last"),

@@ -22,7 +22,7 @@ from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable
-from shapeprog.inference.fit.adjustment import adjust, tidy
+from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.snapping import snapped
 from shapeprog.inference.pieces.pieces import Source, find_pieces
 from shapeprog.inference.roles.roles import in_order, separated, with_roles
@@ -67,7 +67,7 @@ def assemble(
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     program = connected(snapped(_unharmed(adjusted, start, coverage), evidence), coverage)
-    program = tidy(canonical_side(simplest(program)))
+    program = canonical_side(simplest(program))
     program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)
     table = _table([*program.body, *others[:1]], coverage)

@@ -85,12 +85,6 @@ def adjust(
     return tunable.settled(values)
 
 
-def tidy(program: Program) -> Program:
-    """The same program in hundredths of cells and tenths of degrees."""
-    tunable = Tunable(program)
-    return tunable.settled(tunable.values)
-
-
 def of_joints(poses: Poses, joints: Joints, closing: bool) -> System:
     """The part of gaps, whose weight falls where the target opens them: it stretches a leg, but does not lift a seat.
 

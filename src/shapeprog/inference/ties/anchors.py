@@ -23,7 +23,7 @@ from shapeprog.geometry.separation import OrientedBoxes, gaps, touching
 from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, Key, boxes_of
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.placement import AXES
+from shapeprog.language.placement import AXES, POINTS
 from shapeprog.space import Array, FloatArray
 
 
@@ -45,7 +45,9 @@ class _AxisAnchors:
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
         self.thin = {element.line for element in self.elements if self._is_thickness(layout, element)}
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in self.elements]
-        self.spans: list[tuple[int, int, float]] = []  # both ends of a rod, and the cost of different anchors
+        # Both ends of a rod, and the cost of different anchors, or, if they are mirror images, of those at the sides.
+        self.spans: list[tuple[int, int, float]] = []
+        self.images: list[tuple[int, int, float]] = []
         for (line, key), end in index.items():
             if key in ("end", "through") and (line, "start") in index:
                 self._add_span(index[line, "start"], end)
@@ -61,6 +63,8 @@ class _AxisAnchors:
                 by_ends[layout.index[element.line, AXES[axis].size], 2 * k : 2 * k + 2] = -1, 1
             if element.key != "across":
                 by_ends[layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")], 2 * k] = 1
+        for one, other, penalty in self.images:
+            self.costs[one, :2], self.costs[other, :2] = (0.0, penalty), 0.0
         # What the boxes follow from (Q = 2 + 2 K): from one, which gives them at the start, from growth of the whole
         # while all coordinates stay, as mirror images move with its high side, and from moves of the ends of elements.
         with_whole = OrientedBoxes(slopes.centre[..., axis] + np.eye(3)[axis] / 2, slopes.edges[..., axis])
@@ -94,7 +98,9 @@ class _AxisAnchors:
         if element.kind != "interval":
             if self.axis == 2 and element.key != "plane":
                 return [(LOW,), (HIGH,)]
-            return [(MIDDLE,)] if centred and element.key != "last" else [(LOW,), (MIDDLE,), (HIGH,)]
+            if centred and element.key != "last":
+                return [(MIDDLE,), (LOW,), (HIGH,)] if element.key in POINTS else [(MIDDLE,)]
+            return [(LOW,), (MIDDLE,), (HIGH,)]
         if centred:
             return [(LOW, HIGH), (MIDDLE, MIDDLE)]
         # No part has one face at a side and one at the middle: that is almost never chosen.
@@ -104,12 +110,13 @@ class _AxisAnchors:
     def _add_span(self, start: int, end: int) -> None:
         """Both ends of a rod; if they are at equal distances from the middle they stay so."""
         ends, wide = [self.elements[k].low for k in (start, end)], TIES.spanning * self.extent
-        length = abs(ends[0] - ends[1])
-        self.spans.append((start, end, TIES.resized * max(0.0, 1 - length / wide)))
+        span = start, end, TIES.resized * max(0.0, 1 - abs(ends[0] - ends[1]) / wide)
         if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * TIES.off_middle * self.extent:
-            outer = (LOW, HIGH) if ends[0] < ends[1] else (HIGH, LOW)
-            anchors = (MIDDLE, MIDDLE) if length < wide else outer
-            self.choices[start], self.choices[end] = [anchors[:1]], [anchors[1:]]
+            sides = (LOW, HIGH) if ends[0] < ends[1] else (HIGH, LOW)
+            self.choices[start], self.choices[end] = ([(MIDDLE,), (side,)] for side in sides)
+            self.images.append(span)
+        else:
+            self.spans.append(span)
 
     def _unary(self, element: Element, anchors: Anchors) -> float:
         extent = self.extent
@@ -140,7 +147,15 @@ class _AxisAnchors:
         # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
         if len(self.leaning) and self._costs(best[None], exact=True) >= TIES.separated:
             _, best = self._descent(best, exact=True)
+        best = self._with_images(best)
         return [choices[k] for choices, k in zip(self.choices, best, strict=True)]
+
+    def _with_images(self, states: Array) -> Array:
+        """The states (..., K) in which both ends of a symmetric rod have mirrored anchors: those of its start."""
+        states = states.copy()
+        for start, end, _ in self.images:
+            states[..., end] = states[..., start]
+        return states
 
     def _descent(self, state: Array, *, exact: bool = False) -> tuple[float, Array]:
         """The cost and state (K,) from which no change of an element is cheaper."""
@@ -165,7 +180,7 @@ class _AxisAnchors:
 
     def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K); for ``exact`` see :meth:`_gaps`."""
-        elements, growth = np.arange(states.shape[1]), TIES.growth * self.extent
+        states, elements, growth = self._with_images(states), np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
             cost += penalty * (states[:, start] != states[:, end])

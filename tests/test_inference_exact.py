@@ -75,6 +75,14 @@ for i in translate(3, by=(0, 0, 6.9)):
     assert np.allclose(np.concatenate(values(snapped(parse(fitted), evidence))), np.concatenate(values(parse(given))))
 
 
+def test_ends_that_other_parts_hide_are_those_of_the_component():
+    board, post = "box(at=(-6, -0.25, {}), size=(12, 0.5, {}))\n", "box(at=(-12, -1, {}), size=(24, 2, 2))\n"
+    evidence = evidence_of(apart(board.format(-9, 18) + post.format(-11) + post.format(9)))
+    longer, shorter = parse(board.format(-9, 19.5)), parse(board.format(-9, 12))
+    assert np.allclose(values(snapped(longer, evidence))[0], values(parse(board.format(-9, 18)))[0])
+    assert values(snapped(shorter, evidence))[0] == values(shorter)[0]
+
+
 def test_copies_near_one_component_stay_apart():
     row = parse("for i in translate(2, by=(0, 0, 0.4)):\n    box(at=(-12, -6, -6.2), size=(24, 12, 12))\n")
     found = snapped(row, evidence_of(apart("box(at=(-12, -6, -6), size=(24, 12, 12))")))

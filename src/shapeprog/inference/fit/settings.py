@@ -19,7 +19,8 @@ class FitSettings:
     pairs: int = 1_200  # points of the target, and of the surface of the program, that one step uses
     partners: int = 6  # samples among which the partner of a point is found, and points for a sample
     turned: float = 0.5  # distance that counts as much as a normal at a right angle
-    component: float = 0.5  # distance within which the faces of a part are those of a component
+    component: float = 0.5  # distance within which the faces of a part are those of a component,
+    shared: float = 0.8  # or share of the box around both that both fill from which they are
     same: float = 0.5  # least cosine between normals on one face
 
 

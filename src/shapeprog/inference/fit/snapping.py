@@ -18,17 +18,21 @@ from shapeprog.language.program import Loop, Program, nest
 def snapped(program: Program, evidence: Evidence) -> Program:
     """The program, of one node for each block, with parts and rows that end where components of the target do.
 
-    A copy lies on a component if no face of the box around it is farther off than ``FIT.component``.  The first copy of
-    a block is drawn anew on its component, if its statement draws such boxes in one way; rows end at that of their last
-    copy, if it is another.
+    A copy lies on a component if no face of the box around it is farther off than ``FIT.component``, or if both share
+    most of the box around them: the fit does not know ends that other parts hide.  The first copy of a block is drawn
+    anew on its component, if its statement draws such boxes in one way; rows end at that of their last copy, if it is
+    another.
     """
     if not program.size or not len(evidence.parts):
         return program
     scene = scene_of(program.body)
     off = off_parts(scene, evidence)
     straight = scene.mask & (scene.rotation.abs().amax(-1) > 1 - 1e-9).all(-1)
-    nearest, on = off.argmin(-1), (off.min(-1) <= FIT.component) & straight.numpy()
-    ends = evidence.parts[nearest]
+    ends, near = evidence.parts[nearest := off.argmin(-1)], off.min(-1)
+    centre, reach = scene.centre.numpy(), scene.reach.numpy()
+    low, high = np.stack([centre - reach, ends[..., 0, :]]), np.stack([centre + reach, ends[..., 1, :]])
+    shared, around = (high.min(0) - low.max(0)).clip(0).prod(-1), (high.max(0) - low.min(0)).prod(-1)
+    on = straight.numpy() & ((near <= FIT.component) | (near < np.inf) & (shared >= FIT.shared * around))
     middle, half = ends.mean(-2), (ends[..., 1, :] - ends[..., 0, :]) / 2
     body = list(program.body)
     for row, (chain, draw) in enumerate(zip(program.chains, program.draws, strict=True)):

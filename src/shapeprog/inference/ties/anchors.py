@@ -140,9 +140,11 @@ class _AxisAnchors:
 
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
-        # From one side, or where that is no choice in the first way.
+        # From one side, or where that is no choice in the first way; and each end from the nearer side.
         one_sided = [(self.shifts == side / HIGH).all(2).argmax(1) for side in (LOW, HIGH)]
-        starts = [self.costs.argmin(1), *one_sided]
+        farther = np.array([(element.low, element.high) for element in self.elements]) > self.extent / 2
+        nearer = np.nan_to_num(np.abs(self.shifts - farther[:, None]), nan=HIGH).sum(2).argmin(1)
+        starts = [self.costs.argmin(1), *one_sided, nearer]
         _, best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
         # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
         if len(self.leaning) and self._costs(best[None], exact=True) >= TIES.separated:

@@ -217,15 +217,22 @@ for i in mirror(side):
 box(at=(-5, 11, -11), size=(10, 1, 22))  # headboard
 """
 
+COAT_RACK = """
+cylinder(at=(-12, 0, 0), height=0.4, radius=2.6)  # base
+cylinder(at=(-11.6, 0, 0), height=23.6, radius=0.3)  # pedestal
+for i in rotate(6, step=1):
+    rod(start=(10, 0, 0.2), end=(11.1, 0, 2.1), radius=0.13)  # brace
+"""
+
 WHOLE = [
     CHAIR, STOOL_BACK, UPHOLSTERED, TABLE, BOOKCASE, CABINET, WARDROBE, BED, SOFA, SLATTED, TALL, SIDEBOARD, DESK,
     PLATE, CHEST, DOORS, SPLAYED, BETWEEN_ARMS, CORNER, SLATTED_BED,
-    TWO_MATTRESSES
+    TWO_MATTRESSES, COAT_RACK
 ]  # fmt: skip
 NAMES = ["chair", "swivel chair", "upholstered chair", "table", "bookcase", "cabinet", "wardrobe", "bed", "sofa"]
 NAMES += ["slatted bench", "tall cabinet", "sideboard", "desk", "chair on a plate", "chest of drawers", "doors"]
 NAMES += ["sideboard on splayed legs", "sofa between high arms", "corner sofa", "slatted bed"]
-NAMES += ["two mattresses"]
+NAMES += ["two mattresses", "coat rack"]
 
 
 def wanted(text: str) -> list[str]:
@@ -358,6 +365,20 @@ for i in rotate(4, step=1):
     bent_rod(start=(-5, -3.5, 3.5), through=(-5, 0, 5), end=(-5, 3.5, 3.5), radius=0.3)  # stretcher
 """
     assert words(with_roles(sp.parse(text))) == wanted(text)
+
+
+def test_fronts_of_a_pedestal_are_drawers_and_have_handles() -> None:
+    desk = """
+box(at=(11, -6, -12), size=(1, 12, 24))  # top
+for i in mirror(depth):
+    box(at=(-12, 4, 10), size=(23, 1, 1))  # leg
+box(at=(-12, -5, -11), size=(23, 10, 7))  # block
+for i in translate(3, by=(7, 0, 0)):
+    box(at=(-11, -5.4, -10.9), size=(6.5, 0.4, 6.8))  # drawer
+for i in translate(3, by=(7, 0, 0)):
+    box(at=(-8, -5.8, -8.5), size=(0.3, 0.4, 2))  # handle
+"""
+    assert words(with_roles(sp.parse(desk))) == wanted(desk)
 
 
 def test_a_single_solid_is_a_body() -> None:

@@ -85,9 +85,9 @@ BED: tuple[Rule, ...] = (
 CASE: tuple[Rule, ...] = (
     # In front: a plinth, doors and drawers with their handles.
     ("base", lambda p: p.plinth),
-    ("handle", lambda p: p.tiny & p.in_front & p.cased & ~p.grounded & (p.long <= 0.3 * p.size.max())),
-    ("door", lambda p: p.front & p.in_front & p.cased & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
-    ("drawer", lambda p: p.front & p.in_front & p.cased),
+    ("handle", lambda p: p.tiny & p.in_front & p.backed & ~p.grounded & (p.long <= 0.3 * p.size.max())),
+    ("door", lambda p: p.front & p.in_front & p.backed & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
+    ("drawer", lambda p: p.front & p.in_front & p.backed),
     # Lying boards: the highest is the top, one on the ground the base.
     ("top", lambda p: (p.wide | p.main) & p.highest & (p.up <= 0.3 * p.size[UP])),
     ("base", lambda p: p.wide & p.flat & (p.grounded | (p.cased & p.lowest))),
@@ -249,7 +249,8 @@ def _kind(p: Parts) -> tuple[Rule, ...]:
     walls = p.wall & p.outermost & (p.up >= 0.6 * p.size[UP]) & (p.top >= p.floor + 0.9 * p.size[UP])
     above = p.wide & (p.top >= p.floor + 0.8 * p.size[UP])
     closed = above | ((p.front | p.level) & p.rising & (p.rear < 0) & (p.span > 0.3))  # a sofa is open above its seat
-    if not p.main.any() or (walls.sum() > 1 and closed.any()) or (p.rising & p.bulky).any():
+    plate = p.main_high[UP] < p.floor + 0.05 * p.size[UP]  # the base of a coat rack
+    if not p.main.any() or plate or (walls.sum() > 1 and closed.any()) or (p.rising & p.bulky).any():
         return CASE
     high = p.rising & (p.top >= p.main_high[UP] + 0.12 * p.size[UP])
     if (high & (p.rear > 0.1)).any():

@@ -97,6 +97,27 @@ def test_what_is_round_or_leans_is_not_drawn_on_a_box(draw: str):
     assert snapped(program, evidence_of(apart("box(at=(-6, -2, -2), size=(12, 4, 4))"))) == program
 
 
+@pytest.mark.parametrize(
+    ("given", "fitted"),
+    [
+        (
+            "rod(start=(-6, -4, {}), end=(6, 3, {}), radius=0.5)",
+            "rod(start=(-5.8, -4, {}), end=(6.1, 3, {}), radius=0.6)",
+        ),
+        (
+            "board(at=(-6, -4, {}), size=(12, 0.5, 3), tilt=12)",
+            "board(at=(-5.8, -4.1, {}), size=(11.9, 0.6, 3.1), tilt=12.5)",
+        ),
+    ],
+)
+def test_what_leans_is_drawn_on_its_component_as_well(given: str, fitted: str):
+    ends = "box(at=(-8, -5, -12), size=(16, 10, 1))\nbox(at=(-8, -5, 11), size=(16, 10, 1))\n"
+    target, start = (parse(text.replace("{}", "2")) for text in (given, fitted))
+    found = snapped(start, evidence_of(apart(given.replace("{}", "2") + "\n" + ends)))
+    assert np.allclose(values(found)[0], values(target)[0], atol=0.03)
+    assert not np.allclose(values(start)[0], values(target)[0], atol=0.03)
+
+
 def test_a_round_part_is_not_on_a_square_one_of_the_same_box():
     evidence = evidence_of(apart("box(at=(-12, -2, -2), size=(24, 4, 4))"))
     square, round_ = (unroll(parse(text)) for text in (

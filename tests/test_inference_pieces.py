@@ -13,11 +13,11 @@ from shapeprog.data.placement import shape_from_mesh, shape_from_points
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.mesh import union_mesh
-from shapeprog.inference.pieces.oriented import Boxes, boxes_around
 from shapeprog.inference.pieces.pieces import Pieces, Source, find_pieces
 from shapeprog.inference.surface.cloud import points_of_scan, projected
 from shapeprog.inference.surface.components import components, enclosed, solid_sides
 from shapeprog.inference.surface.evidence import evidence_of
+from shapeprog.inference.surface.oriented import Boxes, boxes_around
 from shapeprog.space import Array, FloatArray, Frame
 
 Mesh = tuple[FloatArray, Array]

@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest, solid_boxes
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
@@ -28,7 +26,7 @@ from shapeprog.inference.pieces.pieces import Source, find_pieces
 from shapeprog.inference.roles.roles import in_order, separated, with_roles
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.free import numbers
-from shapeprog.language.hints import STRAIGHT, Box
+from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program
 
 MOST_CANDIDATES = 1_500  # most candidates that are compared; half of them may be single blocks
@@ -79,8 +77,7 @@ def _candidates(evidence: Evidence) -> list[Node]:
     """Single blocks for the pieces of a target, the most important first, and loops over copies of them."""
     pieces = find_pieces(evidence)
     singles = distinct(single_candidates(pieces))
-    upright = (np.abs(pieces.boxes.rotation).max(1) >= STRAIGHT).all(1)
-    components = pieces.boxes.take(upright & (pieces.source == Source.COMPONENT.value))
+    components = pieces.boxes.take(pieces.boxes.straight & (pieces.source == Source.COMPONENT.value))
     boxes = [[Box(*box)] for box in zip(*components, strict=True)]
     loops = repeated(singles, list(rows(boxes)))
     loops = distinct([*loops, *images([*singles, *loops], pieces.cloud.points)])

@@ -21,9 +21,9 @@ from shapeprog.inference.candidates.drawings import drawings, solid_boxes
 from shapeprog.inference.candidates.loops import images, mirror, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
-from shapeprog.inference.pieces.oriented import CORNERS, boxes_around
 from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.surface.oriented import CORNERS, boxes_around
 from shapeprog.language.hints import STRAIGHT, Box
 from shapeprog.language.program import Chain, Loop, Node, Program, nest
 from shapeprog.language.unroll import unroll

@@ -99,7 +99,7 @@ class Coverage:
         points, volume = free_points(evidence)
         self._free = sorted_by_cell(points)
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
-        parts = np.full(len(evidence.parts), self.prices.part / max(1.0, len(evidence.parts) / SETTINGS.parts))
+        parts = np.full(len(evidence.part_fill), self.prices.part / max(1.0, len(evidence.part_fill) / SETTINGS.parts))
         self._weights = np.concatenate(list(map(by_word, (evidence.weights[order], near, free, parts))))
         self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals)
         self._index: dict[Program, int] = {}
@@ -135,7 +135,7 @@ class Coverage:
         agreement = max(evidence.agreement, SETTINGS.agreement)
         near, deeper = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
         _, free = covers(scene, self._free, evidence.tolerance)
-        parts = pack(np.any(off_parts(scene, evidence) <= evidence.tolerance, 1))
+        parts = pack(np.any((off_parts(scene, evidence) <= evidence.tolerance) & evidence.parts.straight, 1))
         interior = np.concatenate([interior, deeper], 1)
         covered = np.concatenate([np.concatenate([explained, near], 1) & ~interior, free, parts], 1)
         points, owners, areas = unsupported(scene, evidence, self._surface)

@@ -10,9 +10,10 @@ import numpy as np
 from shapeprog.inference.candidates.drawings import drawings, scene_of
 from shapeprog.inference.candidates.loops import loop_values
 from shapeprog.inference.fit.settings import FIT
-from shapeprog.inference.surface.evidence import Evidence, off_parts
+from shapeprog.inference.surface.evidence import Evidence, off_parts, seen_along
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Loop, Program, nest
+from shapeprog.space import FloatArray
 
 
 def snapped(program: Program, evidence: Evidence) -> Program:
@@ -23,24 +24,25 @@ def snapped(program: Program, evidence: Evidence) -> Program:
     anew on its component, if its statement draws such boxes in one way; rows end at that of their last copy, if it is
     another.
     """
-    if not program.size or not len(evidence.parts):
+    if not program.size or not len(evidence.part_fill):
         return program
     scene = scene_of(program.body)
     off = off_parts(scene, evidence)
-    straight = scene.mask & (scene.rotation.abs().amax(-1) > 1 - 1e-9).all(-1)
-    ends, near = evidence.parts[nearest := off.argmin(-1)], off.min(-1)
-    centre, reach = scene.centre.numpy(), scene.reach.numpy()
-    low, high = np.stack([centre - reach, ends[..., 0, :]]), np.stack([centre + reach, ends[..., 1, :]])
+    nearest, near = off.argmin(-1), off.min(-1)
+    centre, axes, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
+    away, reach = seen_along(axes, centre, evidence.parts, nearest)
+    low, high = np.stack([away - reach, -half]), np.stack([away + reach, half])
     shared, around = (high.min(0) - low.max(0)).clip(0).prod(-1), (high.max(0) - low.min(0)).prod(-1)
-    on = straight.numpy() & ((near <= FIT.component) | (near < np.inf) & (shared >= FIT.shared * around))
-    middle, half = ends.mean(-2), (ends[..., 1, :] - ends[..., 0, :]) / 2
+    on = (near <= FIT.component) | (near < np.inf) & (shared >= FIT.shared * around)
+    middle = evidence.parts.centre[nearest]
     body = list(program.body)
     for row, (chain, draw) in enumerate(zip(program.chains, program.draws, strict=True)):
         loops = [node for node in chain if isinstance(node, Loop)]
         slots, copies = np.flatnonzero(scene.mask[row]), math.prod(loop.count for loop in loops)
         if len(slots) != copies or not on[row, first := slots[0]]:
             continue
-        options = drawings(Box(middle[row, first], np.eye(3), half[row, first]), draw.name)
+        part = (column[nearest[row, first]] for column in evidence.parts)
+        options = drawings(_along(axes[row, first], *part), draw.name)
         if len(options) != 1:
             continue
         for level, loop in enumerate(loops):
@@ -53,3 +55,10 @@ def snapped(program: Program, evidence: Evidence) -> Program:
                 loops[level] = replace(loop, values=loop_values(loop.count, *step.tolist()))
         body[row] = nest((*loops, replace(options[0], role=draw.role)))
     return Program(tuple(body))
+
+
+def _along(axes: FloatArray, centre: FloatArray, rotation: FloatArray, half: FloatArray) -> Box:
+    """A box with its own axes in the order and the direction of others (3, 3)."""
+    across = axes.T @ rotation
+    order = np.abs(across).argmax(1)
+    return Box(centre, rotation[:, order] * np.sign(across[np.arange(3), order]), half[order])

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from shapeprog.inference.pieces.oriented import Boxes, boxes_around
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.components import IntArray, linked
+from shapeprog.inference.surface.oriented import Boxes, boxes_around
 from shapeprog.space import FloatArray
 
 

@@ -12,10 +12,11 @@ import numpy.typing as npt
 from scipy.ndimage import find_objects
 from scipy.ndimage import label as label_regions
 
-from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, join, principal_axes
+from shapeprog.inference.pieces.groups import distinct
 from shapeprog.inference.pieces.point_kernels import grow_patches
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
+from shapeprog.inference.surface.oriented import Boxes, boxes_around, join, principal_axes
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.hints import STRAIGHT
 from shapeprog.space import FloatArray

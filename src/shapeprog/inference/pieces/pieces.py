@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.geometry.mesh import triangle_normals
+from shapeprog.inference.pieces.groups import distinct, groups
 from shapeprog.inference.pieces.limbs import limbs
-from shapeprog.inference.pieces.oriented import Boxes, boxes_around, distinct, groups, join
 from shapeprog.inference.pieces.patches import planar_patches, sheets, slabs
 from shapeprog.inference.pieces.point_kernels import near_boxes
 from shapeprog.inference.pieces.rods import rods
@@ -23,6 +23,7 @@ from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, projected
 from shapeprog.inference.surface.components import Components, IntArray
 from shapeprog.inference.surface.evidence import Evidence
+from shapeprog.inference.surface.oriented import Boxes, boxes_around, join
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.space import UP, FloatArray
 
@@ -93,7 +94,7 @@ def find_pieces(evidence: Evidence) -> Pieces:
     each class, pieces that explain more points are first.
     """
     if evidence.mesh is not None:
-        cloud, parts = _of_mesh(evidence.mesh)
+        cloud, parts = _of_mesh(evidence.mesh, evidence.boxes)
     else:
         cloud = cloud_of(evidence.surface)
         if cloud.noise > SURFACE.noisy:
@@ -112,10 +113,9 @@ def find_pieces(evidence: Evidence) -> Pieces:
     return Pieces(boxes.take(order), source[order], cloud)
 
 
-def _of_mesh(mesh: Components) -> tuple[Cloud, list[tuple[Source, Boxes]]]:
-    """Pieces from the components of a mesh and from sampled points, with at least some on each large component."""
-    runs = list(pairwise(mesh.start[: SETTINGS.components + 1]))
-    boxes = boxes_around([mesh.vertices[np.unique(mesh.faces[first:last])] for first, last in runs])
+def _of_mesh(mesh: Components, boxes: Boxes) -> tuple[Cloud, list[tuple[Source, Boxes]]]:
+    """Pieces from the components of a mesh, whose boxes are given, and from points, with some on each of these."""
+    runs = list(pairwise(mesh.start[: len(boxes.half) + 1]))
     samples = [sample_with_faces(mesh.vertices, mesh.faces, SETTINGS.points, 0)]
     counts = np.bincount(mesh.component_of(samples[0][1]), minlength=len(runs))
     for first, last in compress(runs, counts < SETTINGS.component_points):

@@ -14,8 +14,7 @@ class Settings:
     points: int = 20_000  # points sampled on a mesh
     component_points: int = 48  # the same of a component, at least
     least_points: int = 32  # points from which a surface is estimated, at least
-    components: int = 300  # pieces of each source, and of all, at most
-    sheets: int = 60
+    sheets: int = 60  # pieces of each source, and of all, at most
     limbs: int = 100
     rods: int = 60
     pieces: int = 600  # slabs, and pieces of all sources
@@ -32,11 +31,6 @@ class Settings:
     # Groups
     group_gap: float = 0.3  # distance between touching boxes, and by which others may exceed the extent of the first
     grouped: int = 120  # boxes that are grouped, the first ones
-
-    # Boxes around points
-    thin: float = 0.05  # side below which thickness is ignored in the selection of directions
-    slender: float = 8.0  # variance along a rod as a multiple of that across it, at least
-    even: float = 0.5  # smaller variance across a rod as a share of the larger one, at least
 
     # Patches, and the bars that they consist of
     patches: int = 160

@@ -106,15 +106,6 @@ def solid_sides(mesh: Components, volume: FloatArray) -> IntArray:
     return np.repeat(sign, np.diff(mesh.start))
 
 
-def part_boxes(mesh: Components, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Low and high corners (G, 2, 3) of the boxes of components along the axes of the grid, and which share (G,) of its
-    box each fills; ``volume`` is what the components enclose, and they fill 0 if they are open."""
-    corners, first = mesh.vertices[mesh.faces], mesh.start[:-1]
-    low, high = np.minimum.reduceat(corners.min(1), first), np.maximum.reduceat(corners.max(1), first)
-    fill = np.abs(volume) / np.maximum((high - low).prod(1), 1e-9)
-    return np.stack([low, high], 1), np.nan_to_num(fill)
-
-
 def enclosed(mesh: Components) -> FloatArray:
     """The signed volume of each component (K,), NaN if it is open.
 

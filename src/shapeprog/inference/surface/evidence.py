@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +18,9 @@ from shapeprog.geometry.mesh import triangle_normals, union_mesh
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
-from shapeprog.inference.surface.components import Components, IntArray, components, enclosed, part_boxes, solid_sides
+from shapeprog.inference.surface.components import Components, IntArray, components, enclosed, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
+from shapeprog.inference.surface.oriented import Boxes, boxes_around, join
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
@@ -43,10 +45,11 @@ class Evidence:
     reach: float  # distance within which one of these points supports a surface
     area: float  # of the surface that the points represent, in proportion to their weights, in square cells
     free: Flags  # cells (R, R, R) of the grid that are known to be free; without meaning outside the box of the surface
-    # Low and high corners of the boxes of the largest closed components that fill most of their box, and which share.
-    parts: FloatArray = field(default_factory=lambda: np.zeros((0, 2, 3)))  # (K, 2, 3)
-    part_fill: FloatArray = field(default_factory=lambda: np.zeros(0))  # (K,)
+    # The boxes of the largest closed components that fill most of their box, and which share (K,).
+    parts: Boxes = field(default_factory=lambda: join([]))
+    part_fill: FloatArray = field(default_factory=lambda: np.zeros(0))
     mesh: Components | None = None  # the components of the target, if it is a mesh
+    boxes: Boxes = field(default_factory=lambda: join([]))  # around the largest of these
 
 
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
@@ -63,14 +66,27 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
 def off_parts(scene: Scene, evidence: Evidence) -> FloatArray:
     """How far the faces of the box around each primitive are at most from those of each part of a mesh (..., N, K), in
     cells; infinitely if the two do not fill the same share of their boxes."""
-    middle, half, mask = scene.centre.numpy(), scene.reach.numpy(), scene.mask.numpy()
-    corners = np.stack([middle - half, middle + half], -2)
-    fill = scene.volumes.numpy() / np.maximum((2 * half).prod(-1), 1e-9)
-    result = np.full((*mask.shape, len(evidence.parts)), np.inf)
-    for k, (part, share) in enumerate(zip(evidence.parts, evidence.part_fill, strict=True)):
-        alike = mask & (np.abs(fill - share) <= SURFACE.off_fill)  # few: most slots of a batch are empty
-        result[alike, k] = np.abs(corners[alike] - part).max((1, 2))
+    mask = scene.mask.numpy()
+    centre, rotation, half = (tensor.numpy()[mask] for tensor in (scene.centre, scene.rotation, scene.bounds))
+    fill = scene.volumes.numpy()[mask] / np.maximum((2 * half).prod(-1), 1e-9)
+    result = np.full((*mask.shape, len(evidence.part_fill)), np.inf)
+    off = np.full((len(half), len(evidence.part_fill)), np.inf)
+    limits = np.where(evidence.parts.straight, SURFACE.off_fill, SURFACE.off_box)
+    for k, (share, limit) in enumerate(zip(evidence.part_fill, limits, strict=True)):
+        alike = np.abs(fill - share) <= limit
+        away, reach = seen_along(rotation[alike], centre[alike], evidence.parts, k)
+        off[alike, k] = (np.abs(away) + np.abs(reach - half[alike])).max(-1)
+    result[mask] = off
     return result
+
+
+def seen_along(
+    axes: FloatArray, origin: FloatArray, boxes: Boxes, index: int | IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """How far some boxes are from origins (..., 3) along axes (..., 3, 3), and how far they reach along these."""
+    across = np.swapaxes(axes, -1, -2)
+    away = (across @ (boxes.centre[index] - origin)[..., None])[..., 0]
+    return away, (np.abs(across @ boxes.rotation[index]) @ boxes.half[index][..., None])[..., 0]
 
 
 def evidence_of_program(program: Program, seed: int = 0) -> Evidence:
@@ -89,9 +105,11 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     # The longest side ends on cell boundaries: rounding would leave holes in faces there, which show the inside.
     mark_triangles(np.ascontiguousarray((corners + HALF) * (SURFACE.looking / RESOLUTION)), 0.5 + 1e-6, barrier)
     points, facing = surface[: SURFACE.points], normals[: SURFACE.points]
-    boxes, fill = part_boxes(mesh, volume)
+    runs = list(pairwise(mesh.start[: SURFACE.components + 1]))
+    boxes = boxes_around([mesh.vertices[np.unique(mesh.faces[first:last])] for first, last in runs])
+    fill = np.nan_to_num(np.abs(volume[: len(runs)]) / np.maximum((2 * boxes.half).prod(1), 1e-9))
     # Thin solids are no obstacle here; boxes hide what is inside of them and what touches them all the same.
-    solid = boxes[np.abs(fill - 1) < SURFACE.off_box][: SURFACE.parts]
+    solid = boxes.take(np.flatnonzero(boxes.straight & (np.abs(fill - 1) < SURFACE.off_box))[: SURFACE.parts])
     front, back = (
         _visible(points, side, barrier) & ~_in_boxes(points + SURFACE.above * side, solid) for side in (facing, -facing)
     )
@@ -107,7 +125,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
         surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
         area * float(weights.mean()), _free_cells(coarse, surface, through=False),
-        boxes[simple], fill[simple], mesh,
+        boxes.take(simple), fill[simple], mesh, boxes,
     )  # fmt: skip
 
 
@@ -188,11 +206,11 @@ def _visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
     return looking(barrier, starts, directions(), 1, through=False)
 
 
-def _in_boxes(points: FloatArray, boxes: FloatArray) -> Flags:
-    """Whether points (P, 3) lie in one of some boxes (K, 2, 3)."""
+def _in_boxes(points: FloatArray, boxes: Boxes) -> Flags:
+    """Whether points (P, 3) lie in one of some boxes."""
     inside = np.zeros(len(points), np.bool_)
-    for low, high in boxes:
-        inside |= ((points > low) & (points < high)).all(1)
+    for centre, rotation, half in zip(*boxes, strict=True):
+        inside |= (np.abs((points - centre) @ rotation) < half).all(1)
     return inside
 
 

@@ -26,10 +26,15 @@ class SurfaceSettings:
     planes: int = 16  # points of a scan to which a plane is fitted
     looking: int = 128  # cells along each side of the grid for visibility
     free: int = 64  # cells along each side of the grid of free space
-    parts: int = 64  # components of a mesh that are compared with parts, the largest
+    thin: float = 0.05  # side of a box below which thickness is ignored in the selection of its directions
+    slender: float = 8.0  # variance along a rod as a multiple of that across it, at least
+    even: float = 0.5  # smaller variance across a rod as a share of the larger one, at least
+    components: int = 300  # components of a mesh that have a box, the largest
+    parts: int = 64  # those that are compared with parts
     simple: float = 0.5  # least share of its box that such a component fills: a ball fills .52
     off_box: float = 0.01  # difference of that share from one up to which it is a box
-    off_fill: float = 0.1  # difference of the shares of their boxes that a component and a primitive on it fill
+    # The same of a component and of a primitive on it; of those that lean, .01: the ends of legs may be level.
+    off_fill: float = 0.1
     above: float = 0.01  # height above a face at which something in contact with it hides it
     nearest: int = 12  # neighbours of a point
     around: int = 20  # neighbours from which a normal is estimated

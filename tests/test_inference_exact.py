@@ -89,12 +89,23 @@ def test_copies_near_one_component_stay_apart():
     assert values(found)[0] == values(row)[0]
 
 
+ENDS = "box(at=(-8, -5, -12), size=(16, 10, 1))\nbox(at=(-8, -5, 11), size=(16, 10, 1))\n"
+"""Two boards that make the whole as long as the grid, so that its numbers are those of the mesh."""
+
+
 @pytest.mark.parametrize(
-    "draw", ["cylinder(at=(-6, 0, 0), height=12, radius=2)", "bar(start=(-6, 0, 0), end=(6, 0.4, 0), section=(4, 4))"]
+    "draw", ["cylinder(at=(-6, 0, 0), height=12, radius=2)", "box(at=(-6, -0.3, -2), size=(12, 0.6, 4))"]
 )
-def test_what_is_round_or_leans_is_not_drawn_on_a_box(draw: str):
+def test_what_is_round_or_upright_is_not_drawn_on_a_box_or_on_a_board_that_leans(draw: str):
     program = parse(draw)
-    assert snapped(program, evidence_of(apart("box(at=(-6, -2, -2), size=(12, 4, 4))"))) == program
+    for component in ("box(at=(-6, -2, -2), size=(12, 4, 4))", "board(at=(-6, -0.3, -2), size=(12, 0.5, 4), tilt=2)"):
+        assert snapped(program, evidence_of(apart(component + "\n" + ENDS))) == program
+
+
+def test_boards_of_a_row_stay_as_long_as_they_are():
+    boards = "".join(f"box(at=(-6, {y}, {-z}), size=(12, 1, {2 * z}))\n" for y, z in ((-4, 5), (0, 6), (4, 6)))
+    row = parse("for i in translate(3, by=(0, 4, 0)):\n    box(at=(-6, -4, -6), size=(12, 1, 12))\n")
+    assert snapped(row, evidence_of(apart(boards + ENDS))).body[0] == row.body[0]
 
 
 @pytest.mark.parametrize(
@@ -111,9 +122,8 @@ def test_what_is_round_or_leans_is_not_drawn_on_a_box(draw: str):
     ],
 )
 def test_what_leans_is_drawn_on_its_component_as_well(given: str, fitted: str):
-    ends = "box(at=(-8, -5, -12), size=(16, 10, 1))\nbox(at=(-8, -5, 11), size=(16, 10, 1))\n"
     target, start = (parse(text.replace("{}", "2")) for text in (given, fitted))
-    found = snapped(start, evidence_of(apart(given.replace("{}", "2") + "\n" + ends)))
+    found = snapped(start, evidence_of(apart(given.replace("{}", "2") + "\n" + ENDS)))
     assert np.allclose(values(found)[0], values(target)[0], atol=0.03)
     assert not np.allclose(values(start)[0], values(target)[0], atol=0.03)
 

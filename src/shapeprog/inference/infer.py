@@ -30,6 +30,7 @@ from shapeprog.inference.calls import with_calls
 from shapeprog.inference.cells.reconstruct import description_length, reconstruct
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Coverage, Prices
+from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.roles.roles import named_anew, note_on_front
 from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
@@ -191,6 +192,9 @@ def infer(
             program, snapped = final, None
     if snapped is None:
         program = placed_if_possible(merged(program), floor)
+        if program.scale is None and program.size:  # a statement without a placed form
+            tunable = Tunable(program)
+            program = tunable.settled(tunable.values)
         if libraries:
             program = with_library(program, joined(libraries))
     program = in_readable_unit(program, unit_of_result(target, program, unit))

@@ -56,7 +56,7 @@ class Prices:
     statement: float = 0.005  # of a drawing statement or call
     loop: float = 0.002
     number: float = 0.0005  # of every continuous number in the text
-    part: float = 0.003  # added for every part of a mesh that one primitive draws, 16 times at most
+    part: float = 0.003  # added for every part of a mesh, along the axes, that one primitive draws, 16 times at most
     outside: float = 0.02  # of reaching beyond the box around the target, such as a last copy that is too many
     close: float = 0.015  # added for the share of the target within half a tolerance, with nearly the same normal
 
@@ -99,7 +99,9 @@ class Coverage:
         points, volume = free_points(evidence)
         self._free = sorted_by_cell(points)
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
-        parts = np.full(len(evidence.part_fill), self.prices.part / max(1.0, len(evidence.part_fill) / SETTINGS.parts))
+        parts = np.full(
+            len(evidence.part_fill), self.prices.part / max(1.0, evidence.parts.straight.sum() / SETTINGS.parts)
+        )
         self._weights = np.concatenate(list(map(by_word, (evidence.weights[order], near, free, parts))))
         self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals)
         self._index: dict[Program, int] = {}

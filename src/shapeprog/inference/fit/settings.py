@@ -20,7 +20,7 @@ class FitSettings:
     partners: int = 6  # samples among which the partner of a point is found, and points for a sample
     turned: float = 0.5  # distance that counts as much as a normal at a right angle
     component: float = 0.5  # distance within which the faces of a part are those of a component,
-    shared: float = 0.8  # or share of the box around both that both fill from which they are
+    shared: float = 0.85  # or which share of the box around both they have in common, at least
     same: float = 0.5  # least cosine between normals on one face
 
 

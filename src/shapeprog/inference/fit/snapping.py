@@ -13,16 +13,15 @@ from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.surface.evidence import Evidence, off_parts, seen_along
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Loop, Program, nest
-from shapeprog.space import FloatArray
 
 
 def snapped(program: Program, evidence: Evidence) -> Program:
     """The program, of one node for each block, with parts and rows that end where components of the target do.
 
-    A copy lies on a component if no face of the box around it is farther off than ``FIT.component``, or if both share
-    most of the box around them: the fit does not know ends that other parts hide.  The first copy of a block is drawn
-    anew on its component, if its statement draws such boxes in one way; rows end at that of their last copy, if it is
-    another.
+    A copy lies on a component if no face of the box around it is farther off than ``FIT.component``, or, outside of
+    rows, if both share most of the box around them: the fit does not know ends that other parts hide.  The first copy
+    of a block is drawn anew on its component, if its statement draws such boxes in one way; rows end at that of their
+    last copy, if it is another.
     """
     if not program.size or not len(evidence.part_fill):
         return program
@@ -33,32 +32,26 @@ def snapped(program: Program, evidence: Evidence) -> Program:
     away, reach = seen_along(axes, centre, evidence.parts, nearest)
     low, high = np.stack([away - reach, -half]), np.stack([away + reach, half])
     shared, around = (high.min(0) - low.max(0)).clip(0).prod(-1), (high.max(0) - low.min(0)).prod(-1)
-    on = (near <= FIT.component) | (near < np.inf) & (shared >= FIT.shared * around)
+    close = near <= FIT.component
+    mostly = (near < np.inf) & (shared >= FIT.shared * around)
     middle = evidence.parts.centre[nearest]
     body = list(program.body)
     for row, (chain, draw) in enumerate(zip(program.chains, program.draws, strict=True)):
         loops = [node for node in chain if isinstance(node, Loop)]
         slots, copies = np.flatnonzero(scene.mask[row]), math.prod(loop.count for loop in loops)
-        if len(slots) != copies or not on[row, first := slots[0]]:
+        alone = all(loop.name != "translate" for loop in loops)  # copies in a row may be on components of other sizes
+        if len(slots) != copies or not (close | mostly & alone)[row, first := slots[0]]:
             continue
-        part = (column[nearest[row, first]] for column in evidence.parts)
-        options = drawings(_along(axes[row, first], *part), draw.name)
+        options = drawings(Box(*(column[nearest[row, first]] for column in evidence.parts)), draw.name)
         if len(options) != 1:
             continue
         for level, loop in enumerate(loops):
             copies //= loop.count
             last = slots[copies * (loop.count - 1)]
             other = nearest[row, last] != nearest[row, first]  # copies within .5 cells may be near the same component
-            if loop.name == "translate" and on[row, last] and other:
+            if loop.name == "translate" and close[row, last] and other:
                 way = (middle[row, last] - middle[row, first]) / max(loop.count - 1, 1)
                 step = np.where(np.array(loop.values[1:]) == 0, 0.0, way)
                 loops[level] = replace(loop, values=loop_values(loop.count, *step.tolist()))
         body[row] = nest((*loops, replace(options[0], role=draw.role)))
     return Program(tuple(body))
-
-
-def _along(axes: FloatArray, centre: FloatArray, rotation: FloatArray, half: FloatArray) -> Box:
-    """A box with its own axes in the order and the direction of others (3, 3)."""
-    across = axes.T @ rotation
-    order = np.abs(across).argmax(1)
-    return Box(centre, rotation[:, order] * np.sign(across[np.arange(3), order]), half[order])

@@ -147,13 +147,14 @@ class Parts:
         # Of the whole: its sides reach the floor; it has sides, or a body.
         self.walled = (sides & self.grounded).sum() > 1
         self.cased = np.bool_(sides.sum() > 1 or self.bulky.any())
-        # Or a part begins right behind most of another: a pedestal of a desk behind a drawer, that behind its handle.
+        # In a case, or before a deep part that covers most of it (a drawer on a pedestal), or before such a front (its
+        # handle)
         right_behind = np.abs(self.high[:, None, DEPTH] - self.low[:, DEPTH]) <= self.near / 2
         shared = np.minimum(self.high[:, None], self.high) - np.maximum(self.low[:, None], self.low)
         right_behind &= shared[..., UP].clip(0) * shared[..., SIDE].clip(0) >= 0.8 * (self.up * self.side)[:, None]
         deep = ~self.board & ~self.slender & (self.depth >= self.size[DEPTH] / 2)
-        front = right_behind[:, deep].any(1)
-        self.backed: Mask = self.cased | front | right_behind[:, front].any(1)
+        on_body = right_behind[:, deep].any(1)
+        self.backed: Mask = self.cased | on_body | right_behind[:, on_body].any(1)
         broad_frontways = ~self.slender | (self.upright & (self.side >= self.size[SIDE] / 2))
         large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
         self.front: Mask = self.board & (self.depth == self.thin) & (broad_frontways | large)

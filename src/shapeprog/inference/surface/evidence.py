@@ -49,7 +49,9 @@ class Evidence:
     parts: Boxes = field(default_factory=lambda: join([]))
     part_fill: FloatArray = field(default_factory=lambda: np.zeros(0))
     mesh: Components | None = None  # the components of the target, if it is a mesh
-    boxes: Boxes = field(default_factory=lambda: join([]))  # around the largest of these
+    boxes: Boxes = field(
+        default_factory=lambda: join([])
+    )  # around the largest components of the mesh, open ones included
 
 
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
@@ -65,15 +67,16 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
 
 def off_parts(scene: Scene, evidence: Evidence) -> FloatArray:
     """How far the faces of the box around each primitive are at most from those of each part of a mesh (..., N, K), in
-    cells; infinitely if the two do not fill the same share of their boxes."""
+    cells; infinitely if only one leans, or the two do not fill the same share of their boxes."""
     mask = scene.mask.numpy()
     centre, rotation, half = (tensor.numpy()[mask] for tensor in (scene.centre, scene.rotation, scene.bounds))
     fill = scene.volumes.numpy()[mask] / np.maximum((2 * half).prod(-1), 1e-9)
     result = np.full((*mask.shape, len(evidence.part_fill)), np.inf)
     off = np.full((len(half), len(evidence.part_fill)), np.inf)
-    limits = np.where(evidence.parts.straight, SURFACE.off_fill, SURFACE.off_box)
-    for k, (share, limit) in enumerate(zip(evidence.part_fill, limits, strict=True)):
-        alike = np.abs(fill - share) <= limit
+    straight = Boxes(centre, rotation, half).straight
+    for k, (share, along) in enumerate(zip(evidence.part_fill, evidence.parts.straight, strict=True)):
+        # Seen along the axes of the grid, a board that leans by a degree would be as thick as its ends are apart.
+        alike = (straight == along) & (np.abs(fill - share) <= (SURFACE.off_fill if along else SURFACE.off_box))
         away, reach = seen_along(rotation[alike], centre[alike], evidence.parts, k)
         off[alike, k] = (np.abs(away) + np.abs(reach - half[alike])).max(-1)
     result[mask] = off
@@ -83,7 +86,7 @@ def off_parts(scene: Scene, evidence: Evidence) -> FloatArray:
 def seen_along(
     axes: FloatArray, origin: FloatArray, boxes: Boxes, index: int | IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """How far some boxes are from origins (..., 3) along axes (..., 3, 3), and how far they reach along these."""
+    """How far some boxes are from origins (..., 3) along axes (..., 3, 3), and their half extents along these."""
     across = np.swapaxes(axes, -1, -2)
     away = (across @ (boxes.centre[index] - origin)[..., None])[..., 0]
     return away, (np.abs(across @ boxes.rotation[index]) @ boxes.half[index][..., None])[..., 0]

@@ -13,7 +13,6 @@ from shapeprog.inference.surface.cloud import spiral
 from shapeprog.inference.surface.components import IntArray
 from shapeprog.inference.surface.oriented_kernels import COMPACT, FLAT, ROD, turn_each
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.language.hints import STRAIGHT
 from shapeprog.space import Array, FloatArray
 
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # the corners (8, 3) of a box of half extents 1
@@ -35,7 +34,7 @@ class Boxes(NamedTuple):
     @property
     def straight(self) -> npt.NDArray[np.bool_]:
         """Which of them lie along the axes of the grid (N,)."""
-        return (np.abs(self.rotation).max(1) >= STRAIGHT).all(1)
+        return (np.abs(self.rotation).max(1) >= 1 - 1e-6).all(1)
 
     def corners(self) -> FloatArray:
         """Their corners (N, 8, 3)."""

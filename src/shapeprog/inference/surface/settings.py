@@ -30,10 +30,11 @@ class SurfaceSettings:
     slender: float = 8.0  # variance along a rod as a multiple of that across it, at least
     even: float = 0.5  # smaller variance across a rod as a share of the larger one, at least
     components: int = 300  # components of a mesh that have a box, the largest
-    parts: int = 64  # those that are compared with parts
+    parts: int = 64  # components that are compared with parts of programs, at most
     simple: float = 0.5  # least share of its box that such a component fills: a ball fills .52
     off_box: float = 0.01  # difference of that share from one up to which it is a box
-    # The same of a component and of a primitive on it; of those that lean, .01: the ends of legs may be level.
+    # Difference of the shares of their boxes that a component and a primitive on it fill, at most; if they lean,
+    # ``off_box``: a splayed leg with level ends is no rod.
     off_fill: float = 0.1
     above: float = 0.01  # height above a face at which something in contact with it hides it
     nearest: int = 12  # neighbours of a point

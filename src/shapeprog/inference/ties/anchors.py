@@ -45,12 +45,14 @@ class _AxisAnchors:
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
         self.thin = {element.line for element in self.elements if self._is_thickness(layout, element)}
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in self.elements]
-        # Both ends of a rod, and the cost of different anchors, or, if they are mirror images, of those at the sides.
+        # Both ends of a rod, with the cost of different anchors, or, of mirror images, of those at the sides
         self.spans: list[tuple[int, int, float]] = []
         self.images: list[tuple[int, int, float]] = []
         for (line, key), end in index.items():
             if key in ("end", "through") and (line, "start") in index:
                 self._add_span(index[line, "start"], end)
+        symmetric = {start for start, _, _ in self.images}
+        self.spans = [span for span in self.spans if span[0] not in symmetric]
         count, most = len(self.elements), max(map(len, self.choices), default=1)
         self.costs = np.full((count, most), np.inf)
         # By which share of the growth of the whole low and high ends move.
@@ -126,6 +128,7 @@ class _AxisAnchors:
             if anchor == MIDDLE:
                 cost += TIES.middle * (not centred)
                 continue
+            cost += TIES.middle / 2 * (centred and element.kind == "coordinate" and element.key != "last")
             share = (end if anchor == LOW else extent - end) / extent
             if self.axis < 2 or element.key == "last":
                 cost += TIES.farther * max(0.0, 2 * share - 1)
@@ -142,8 +145,8 @@ class _AxisAnchors:
         """The anchors of every element."""
         # From one side, or where that is no choice in the first way; and each end from the nearer side.
         one_sided = [(self.shifts == side / HIGH).all(2).argmax(1) for side in (LOW, HIGH)]
-        farther = np.array([(element.low, element.high) for element in self.elements]) > self.extent / 2
-        nearer = np.nan_to_num(np.abs(self.shifts - farther[:, None]), nan=HIGH).sum(2).argmin(1)
+        high = np.array([(each.low, each.high) for each in self.elements]).reshape(-1, 1, 2) > self.extent / 2
+        nearer = np.nan_to_num(np.abs(self.shifts - high), nan=np.inf).sum(2).argmin(1)
         starts = [self.costs.argmin(1), *one_sided, nearer]
         _, best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
         # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
@@ -185,7 +188,7 @@ class _AxisAnchors:
         states, elements, growth = self._with_images(states), np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
-            cost += penalty * (states[:, start] != states[:, end])
+            cost += penalty * (shifts[:, start, 0] != shifts[:, end, 0])
         for last, first in self.rows.items():  # a row gives a side or the middle of its last copy
             shifts[:, last] -= shifts[:, last, :1] * (shifts[:, first, 1:] - shifts[:, first, :1])
         amounts = np.full((2 * states.shape[1] + 2, len(states)), growth)

@@ -50,11 +50,11 @@ class Layout:
                 case Group("mirror", keywords, body) if divide and {*keywords} <= {("x", 0.0), ("y", 0.0)}:
                     # Each may become a division, or move into a box, alone; the text joins the others again.
                     drawing += [replace(line, body=(inner,)) for inner in body]
-                case Group("translate", body=body) if divide:
+                case Group("translate", body=body) if divide:  # those that become divisions alone
                     rows = [replace(line, body=(inner,)) for inner in body]
-                    drawing += [row for row in rows if self._divisions(row) is not row]
-                    rest = tuple(row.body[0] for row in rows if self._divisions(row) is row)
-                    drawing += [replace(line, body=rest)] if rest else []
+                    alone = [row for row in rows if self._divisions(row) is not row]
+                    rest = tuple(row.body[0] for row in rows if row not in alone)
+                    drawing += [*alone, *([replace(line, body=rest)] if rest else [])]
                 case Part() | Group():
                     drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)

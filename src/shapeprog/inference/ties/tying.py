@@ -125,7 +125,7 @@ class _Ties:
         minimum, start = np.where(self.fixed, 1e6, weight), layout.numbers.copy()
         if evidence.mesh is not None and not known:  # the size of a mesh is exact
             size = np.ptp(evidence.mesh.vertices, 0)[::-1]
-            start[:3] = np.where(np.abs(size - start[:3]) < TIES.within, size, start[:3])
+            start[:3] = np.where(np.abs(size - start[:3]) < TIES.nearly, size, start[:3])
             minimum[:3] = np.maximum(minimum[:3], TIES.extent)
         self.misfit = Misfit(layout, evidence, joints, start, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again

@@ -39,7 +39,8 @@ class Layout:
     anchors
         The anchors of all elements; by default the low side.
     divide
-        Whether neighbours become divisions of a box, and outer mirrors about the middle are around one line each.
+        Whether neighbours become divisions of a box, also where their row has other parts, and outer mirrors about the
+        middle are around one line each.
     """
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None, *, divide: bool = True) -> None:

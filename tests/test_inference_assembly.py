@@ -302,6 +302,15 @@ def test_a_statement_of_a_users_own_is_proposed_by_its_hint():
     assert "drum" not in language()
 
 
+def test_a_program_without_a_placed_form_is_written_in_hundredths_of_cells():
+    with using(without_the_paper()) as own:
+        own.register(LANGUAGE["cone_leg"])
+        program = sp.infer(load(EXAMPLES / "cabinet_quaternius_night_stand.obj")).program
+    assert program.scale is None
+    values = [value for node in program.walk() for value in node.values]
+    assert np.allclose(values, np.round(values, 2), atol=1e-5)
+
+
 def test_two_fronts_on_a_case_are_two_parts_though_the_gap_between_them_is_narrow():
     text = "locker(at=(-12, -6, -8), size=(24, 12, 16))\n"
     text += "for i in translate(2, by=(0, 0, 8.1)):\n    layer(at=(-12, -6.5, -4.05), thickness=24, half=(0.5, 3.95))\n"

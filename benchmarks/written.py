@@ -77,15 +77,15 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    """Measure the programs of a folder, or print the table of a run."""
+    """Measure the programs of a folder that have no row yet, and print the table of all rows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("examples/pieces"), help="with .shape files")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("written.jsonl"), help="rows, one line of JSON each")
     args = parser.parse_args()
     known = {row["name"] for row in read_rows(args.out)}
-    measure_all(args.out, [file for file in sorted(args.folder.glob("*.shape")) if file.stem not in known], measure,
-                args.workers)  # fmt: skip
+    todo = [file for file in sorted(args.folder.glob("*.shape")) if file.stem not in known]
+    measure_all(args.out, todo, measure, args.workers)
     print(table(read_rows(args.out)))
 
 

@@ -99,9 +99,8 @@ class Coverage:
         points, volume = free_points(evidence)
         self._free = sorted_by_cell(points)
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
-        parts = np.full(
-            len(evidence.part_fill), self.prices.part / max(1.0, evidence.parts.straight.sum() / SETTINGS.parts)
-        )
+        straight = evidence.parts.straight
+        parts = np.full(len(straight), self.prices.part / max(1.0, straight.sum() / SETTINGS.parts))
         self._weights = np.concatenate(list(map(by_word, (evidence.weights[order], near, free, parts))))
         self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals)
         self._index: dict[Program, int] = {}

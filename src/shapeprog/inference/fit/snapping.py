@@ -27,20 +27,20 @@ def snapped(program: Program, evidence: Evidence) -> Program:
         return program
     scene = scene_of(program.body)
     off = off_parts(scene, evidence)
-    nearest, near = off.argmin(-1), off.min(-1)
+    nearest, distance = off.argmin(-1), off.min(-1)
     centre, axes, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
     away, reach = seen_along(axes, centre, evidence.parts, nearest)
     low, high = np.stack([away - reach, -half]), np.stack([away + reach, half])
     shared, around = (high.min(0) - low.max(0)).clip(0).prod(-1), (high.max(0) - low.min(0)).prod(-1)
-    close = near <= FIT.component
-    mostly = (near < np.inf) & (shared >= FIT.shared * around)
+    close = distance <= FIT.component
+    mostly = (distance < np.inf) & (shared >= FIT.shared * around)
     middle = evidence.parts.centre[nearest]
     body = list(program.body)
     for row, (chain, draw) in enumerate(zip(program.chains, program.draws, strict=True)):
         loops = [node for node in chain if isinstance(node, Loop)]
         slots, copies = np.flatnonzero(scene.mask[row]), math.prod(loop.count for loop in loops)
         alone = all(loop.name != "translate" for loop in loops)  # copies in a row may be on components of other sizes
-        if len(slots) != copies or not (close | mostly & alone)[row, first := slots[0]]:
+        if len(slots) != copies or not (close | (mostly & alone))[row, first := slots[0]]:
             continue
         options = drawings(Box(*(column[nearest[row, first]] for column in evidence.parts)), draw.name)
         if len(options) != 1:

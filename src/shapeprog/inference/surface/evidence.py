@@ -45,13 +45,12 @@ class Evidence:
     reach: float  # distance within which one of these points supports a surface
     area: float  # of the surface that the points represent, in proportion to their weights, in square cells
     free: Flags  # cells (R, R, R) of the grid that are known to be free; without meaning outside the box of the surface
-    # The boxes of the largest closed components that fill most of their box, and which share (K,).
+    mesh: Components | None = None  # the components of the target, if it is a mesh
+    # Boxes around its largest components, open ones included, and those (K) of closed components that fill most of
+    # their box, with the share of it that each fills
+    boxes: Boxes = field(default_factory=lambda: join([]))
     parts: Boxes = field(default_factory=lambda: join([]))
     part_fill: FloatArray = field(default_factory=lambda: np.zeros(0))
-    mesh: Components | None = None  # the components of the target, if it is a mesh
-    boxes: Boxes = field(
-        default_factory=lambda: join([])
-    )  # around the largest components of the mesh, open ones included
 
 
 def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
@@ -128,7 +127,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
         points, facing, weights / weights.sum(), oriented, SURFACE.tolerance, SURFACE.agreement,
         surface, normals, sides[face] != 0, _reach(SURFACE.tolerance, area, SURFACE.surface),
         area * float(weights.mean()), _free_cells(coarse, surface, through=False),
-        boxes.take(simple), fill[simple], mesh, boxes,
+        mesh, boxes, boxes.take(simple), fill[simple],
     )  # fmt: skip
 
 

@@ -100,9 +100,9 @@ class _AxisAnchors:
         if element.kind != "interval":
             if self.axis == 2 and element.key != "plane":
                 return [(LOW,), (HIGH,)]
-            if centred and element.key != "last":
-                return [(MIDDLE,), (LOW,), (HIGH,)] if element.key in POINTS else [(MIDDLE,)]
-            return [(LOW,), (MIDDLE,), (HIGH,)]
+            # Ends of rods near the middle may still go with a side, where the parts that they join do.
+            only_middle = centred and element.key not in ("last", *POINTS)
+            return [(MIDDLE,)] if only_middle else [(LOW,), (MIDDLE,), (HIGH,)]
         if centred:
             return [(LOW, HIGH), (MIDDLE, MIDDLE)]
         # No part has one face at a side and one at the middle: that is almost never chosen.

@@ -21,6 +21,7 @@ from shapeprog.inference.choice.choice import choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
 from shapeprog.inference.choice.coverage import Coverage, CoverageTable
 from shapeprog.inference.fit.adjustment import adjust
+from shapeprog.inference.fit.planes import on_planes
 from shapeprog.inference.fit.snapping import snapped
 from shapeprog.inference.pieces.pieces import Source, find_pieces
 from shapeprog.inference.roles.roles import in_order, separated, with_roles
@@ -64,7 +65,8 @@ def assemble(
     report("finding structure", 1.0)
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
-    program = connected(snapped(_unharmed(adjusted, start, coverage), evidence), coverage)
+    fitted = on_planes(_unharmed(adjusted, start, coverage), evidence)
+    program = connected(snapped(fitted, evidence), coverage)
     program = canonical_side(simplest(program))
     program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)

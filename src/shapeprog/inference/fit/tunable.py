@@ -82,8 +82,11 @@ class Tunable:
 
     def settled(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers, rounded."""
-        tidy = self.rounded(values).tolist()
-        table = {key: to_float32(value) for key, value in zip(self.moving, tidy, strict=True)}
+        return self.drawn(self.rounded(values))
+
+    def drawn(self, values: Float[Tensor, " F"]) -> Program:
+        """The program with these numbers."""
+        table = {key: to_float32(value) for key, value in zip(self.moving, values.tolist(), strict=True)}
         return _changed(self.program, lambda key, value: table.get(key, value))
 
     def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:

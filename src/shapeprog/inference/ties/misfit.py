@@ -10,6 +10,7 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.fit.joints import Joints, moved, needs
+from shapeprog.inference.fit.planes import faces_of
 from shapeprog.inference.fit.residuals import Target, of_target
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.surface.evidence import Evidence
@@ -41,6 +42,14 @@ class Misfit:
         angles = np.array([slot.kind == "angle" for slot in layout.slots])
         self.together: FloatArray = np.full(len(joints.pairs), TIES.together)  # weights of the squared gaps (C,)
         self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
+        # How far faces on planes of a mesh are from these (R,), how that follows from the numbers (R, P), and weights.
+        self.on_planes: list[FloatArray] = []
+        if evidence.mesh is not None:
+            poses = layout.poses(layout.numbers)
+            faces = faces_of(poses.scene, evidence.mesh)
+            off, moves = faces.off(poses)
+            on = np.abs(off) < FIT.on_plane
+            self.on_planes = [(off - moves @ layout.numbers)[on], moves[on], faces.weight[on]]
 
     def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:
         """Half the slope (P,) and half the curvature (P, P) of the mean squared distance where the numbers are these
@@ -53,6 +62,10 @@ class Misfit:
             wide = torch.from_numpy(self.together[:, None]) * slopes
             slope = slope + (wide.T @ residual).numpy()
             curvature = curvature + (wide.T @ slopes).numpy()
+        if self.on_planes:
+            off, moves, weight = self.on_planes
+            slope = slope + (weight * (off + moves @ numbers)) @ moves
+            curvature = curvature + (weight[:, None] * moves).T @ moves
         return slope + self.prior * (numbers - self.start), curvature + np.diag(self.prior)
 
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:

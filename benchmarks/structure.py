@@ -80,7 +80,7 @@ MISSING = 0.2
 
 @dataclass(frozen=True)
 class Task:
-    """One object of one set, as files, and how it is inferred; ``tied`` needs a program without ties in cells."""
+    """One object of one set, as files, and how it is inferred; ``tied`` needs a program in cells without ties."""
 
     set: str
     name: str
@@ -128,13 +128,12 @@ def measure(task: Task) -> dict[str, Any]:
     if len(parts) > 1:
         row = replace(row, **part_scores(placed, unroll(program), task.seed)._asdict())
     text = format_program(program)
-    in_cells = {"in_cells": format_program(Program(program.body))} if task.method == "untied" else {}
     edited = edit_scores(program)._asdict() if task.method in ("all", "tied") and task.price == 1 else {}
     return asdict(row) | {
         "set": task.set, "seconds": seconds, "cpu_seconds": cpu_seconds, "allowed": task.blocks, "seed": task.seed,
         "method": task.method, "price": task.price, "lines": len(text.splitlines()), "program": text,
         "object_in_one_piece": joined(target.vertices, target.faces),
-        **in_cells,  # the text alone does not tell where its whole is in the grid
+        "in_cells": format_program(Program(program.body)),  # the text does not tell where its whole is in the grid
         **{f"edited_{name}": share for name, share in edited.items()},
     }  # fmt: skip
 
@@ -230,13 +229,13 @@ def run(args: argparse.Namespace) -> None:
         if (which, name, blocks, method, price) not in done
     ]
     if "tied" in args.methods:
-        before = {key[:3]: row["in_cells"] for key, row in done.items() if key[3] == "untied"}
+        before = {key[:3]: row.get("in_cells", "") for key, row in done.items() if key[3] == "untied"}
         todo = [
             replace(task, program=before.get((task.set, task.name, task.blocks), "")) if task.method == "tied" else task
             for task in todo
         ]
         if any(task.method == "tied" and not task.program for task in todo):
-            raise SystemExit(f"{out} lacks programs to tie: measure --methods untied first")
+            raise SystemExit(f"{out} lacks programs in cells to tie: measure --methods untied first, in a new file")
     measure_all(out, todo, measure, args.workers)
 
 

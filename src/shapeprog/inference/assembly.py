@@ -2,8 +2,8 @@
 
 Pieces of the target become single blocks, and copies among them loops.  A first choice is fitted briefly, then competes
 with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored where fitting
-did harm, drawn on the components of a mesh, and connected again.  Then all parts get roles.  Pieces become candidates
-by the hints of statements, not by their names.
+did harm, moved onto the planes of a mesh, drawn on its components, and connected again.  Then all parts get roles.
+Pieces become candidates by the hints of statements, not by their names.
 """
 
 from __future__ import annotations

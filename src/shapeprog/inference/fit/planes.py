@@ -1,8 +1,8 @@
 """Straight faces of parts onto the planes of a mesh: a plane is exact, a fit to samples is not.
 
 A least-squares fit leaves a face between two planes that it may stand for, and has few samples on small faces.  Here
-each face takes the plane that covers most of it nearby; the numbers follow by iteratively reweighted least squares
-(Holland & Welsch 1977), so that faces that share a number agree on one plane.
+each face is assigned the plane nearby that covers most of it.  Where faces that share a number disagree, the number
+follows the larger area: weights are those of Cauchy, by iteratively reweighted least squares (Holland & Welsch 1977).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import KINDS
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.settings import FIT
-from shapeprog.inference.fit.tunable import Poses, Tunable
+from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
 from shapeprog.inference.surface.components import Components, IntArray
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.surface.oriented import Boxes
@@ -26,25 +26,25 @@ from shapeprog.space import FloatArray
 
 
 class Faces(NamedTuple):
-    """Faces of boxes along the axes of the grid, and where they should be."""
+    """Faces of boxes along the axes of the grid, with the planes on which they should lie."""
 
-    slot: IntArray  # of each (R,) its primitive,
-    axis: IntArray  # the axis that it is perpendicular to,
-    side: IntArray  # -1 for the low and 1 for the high face of its box,
-    at: FloatArray  # the coordinate of its plane, or its own where it has none,
-    weight: FloatArray  # and how much of it the plane covers, as a share of the mesh; little where it has none
+    slot: IntArray  # index of the primitive (R,)
+    axis: IntArray  # axis of the normal (R,)
+    side: IntArray  # -1 for the low, 1 for the high face (R,)
+    target: FloatArray  # coordinate of the plane (R,), in cells; that of the face itself where it has none
+    weight: FloatArray  # area that the plane covers (R,), as a share of the mesh; little where there is none
 
-    def off(self, poses: Poses) -> tuple[FloatArray, FloatArray]:
-        """How far the faces are from their planes (R,), and how that changes with the numbers (R, F)."""
-        (centre, size, rotation), slopes = (poses.scene.centre, poses.scene.size, poses.scene.rotation), poses.slopes
-        along = rotation[self.slot, self.axis].abs().argmax(-1)
-        face = centre[self.slot, self.axis].numpy() + self.side * size[self.slot, along].numpy()
+    def residuals(self, poses: Poses) -> tuple[FloatArray, FloatArray]:
+        """The distances of the faces from their planes (R,), and their derivatives by the numbers (R, F)."""
+        scene, slopes = poses
+        along = scene.rotation[self.slot, self.axis].abs().argmax(-1)
+        face = scene.centre[self.slot, self.axis].numpy() + self.side * scene.size[self.slot, along].numpy()
         moves = slopes[self.slot, SIZES + self.axis].numpy() + self.side[:, None] * slopes[self.slot, along].numpy()
-        return face - self.at, moves
+        return face - self.target, moves
 
 
 def faces_of(scene: Scene, mesh: Components) -> Faces:
-    """The faces of the straight boxes of a scene (N,)."""
+    """The straight faces of the boxes of a scene (N,), and the planes of a mesh on which they should lie."""
     centre, half, rotation = (tensor.numpy() for tensor in (scene.centre, scene.reach, scene.rotation))
     kind, upright = scene.kind.numpy(), scene.size[:, 3].numpy() == 0  # others have a lean
     square = ((kind == KINDS["cuboid"]) & upright) | (kind == KINDS["rounded_box"])
@@ -53,42 +53,45 @@ def faces_of(scene: Scene, mesh: Components) -> Faces:
     rows = list[tuple[int, int, int, float, float]]()
     for axis in range(3):
         level = np.flatnonzero(np.abs(normals[:, axis]) >= FIT.level)
-        level = level[np.argsort(corners[level, 0, axis], kind="stable")]
-        height, flat = corners[level, 0, axis], np.delete(corners[level], axis, 2)
+        level = level[np.argsort(corners[level, :, axis].mean(1), kind="stable")]
+        height, flat = corners[level, :, axis].mean(1), np.delete(corners[level], axis, 2)
         low, high = flat.min(1), flat.max(1)
         for slot in slots:
             middle, reach = np.delete(centre[slot], axis), np.delete(half[slot], axis)
-            ends = [centre[slot, axis] + side * half[slot, axis] for side in (-1, 1)]
-            window = slice(*np.searchsorted(height, [ends[0] - FIT.plane, ends[1] + FIT.plane]))
-            # Half of what the box around each triangle shares with the face.
-            shared = np.minimum(high[window], middle + reach) - np.maximum(low[window], middle - reach)
-            covered, total = shared.clip(0).prod(1) / 2, float((2 * reach).prod())
-            (first, one), (last, other) = (_plane(end, height[window], covered, FIT.covered * total) for end in ends)
-            if one and other and last - first < FIT.sheet:  # one plane for both
-                first, last = (first + side * half[slot, axis] for side in (-1, 1))
-                one, other = one / 2, other / 2
-            rows += [
-                (slot, axis, -1, first, one or FIT.stays * total),
-                (slot, axis, 1, last, other or FIT.stays * total),
-            ]
-    *which, at, area = np.array(rows, np.float64).reshape(-1, 5).T
-    slot, axis, side = np.array(which, np.int64)
-    return Faces(slot, axis, side, at, area / mesh.area.sum())
+            total, ends = float((2 * reach).prod()), centre[slot, axis] + half[slot, axis] * np.array([-1.0, 1.0])
+            planes = []
+            for end in ends.tolist():
+                near = slice(*np.searchsorted(height, [end - FIT.plane_reach, end + FIT.plane_reach]))
+                # The shared area of right triangles along the axes, and an upper bound of that of others.
+                shared = np.minimum(high[near], middle + reach) - np.maximum(low[near], middle - reach)
+                planes.append(_plane(end, height[near], shared.clip(0).prod(1) / 2, total))
+            (first, _), (last, _) = planes
+            if last - first < THINNEST:  # one plane for both faces, of which the nearer one takes it
+                farther = int(abs(first - ends[0]) < abs(last - ends[1]))
+                planes[farther] = float(ends[farther]), 0.0
+            for side, (plane, area) in zip((-1, 1), planes, strict=True):
+                rows.append((slot, axis, side, plane, area or FIT.uncovered * total))
+    *which, target, weight = np.array(rows, np.float64).reshape(-1, 5).T
+    owner, axes, sides = np.array(which, np.int64)
+    return Faces(owner, axes, sides, target, weight / mesh.area.sum())
 
 
-def _plane(at: float, heights: FloatArray, covered: FloatArray, least: float) -> tuple[float, float]:
-    """The coordinate of a plane near a face, and how much of the face it covers; the face itself, and zero, if none
-    covers enough of it."""
-    near = (covered > 0) & (np.abs(heights - at) <= FIT.plane)
-    heights, covered = heights[near], covered[near]
-    first = np.flatnonzero(np.diff(heights, prepend=-np.inf) > FIT.one_plane)
+def _plane(face: float, heights: FloatArray, shared: FloatArray, total: float) -> tuple[float, float]:
+    """The coordinate of the plane of a face, and how much of it this covers; its own and zero if it has no plane.
+
+    Triangles at these heights (T,), in order, share so much area (T,) with the face, whose area is ``total``.
+    """
+    heights, shared = heights[shared > 0], shared[shared > 0]
+    first = np.flatnonzero(np.diff(heights, prepend=-np.inf) > FIT.plane_step)
     if not len(first):
-        return at, 0.0
-    areas = np.add.reduceat(covered, first)
-    planes = np.add.reduceat(covered * heights, first) / areas
-    score = np.where(areas >= least, areas * np.exp(-(((planes - at) / FIT.near_plane) ** 2)), 0.0)
+        return face, 0.0
+    sums = np.add.reduceat(shared, first)
+    planes = np.add.reduceat(shared * heights, first) / sums
+    wide = np.maximum.reduceat(heights, first) - heights[first] > FIT.plane_width  # a surface that is curved
+    areas = np.where(wide, 0.0, np.minimum(sums, total))
+    score = areas * np.exp(-(((planes - face) / FIT.plane_falloff) ** 2))
     best = int(score.argmax())
-    return (float(planes[best]), float(areas[best])) if score[best] > 0 else (at, 0.0)
+    return (float(planes[best]), float(areas[best])) if score[best] >= FIT.covered * total else (face, 0.0)
 
 
 def on_planes(program: Program, evidence: Evidence) -> Program:
@@ -96,13 +99,18 @@ def on_planes(program: Program, evidence: Evidence) -> Program:
     if not program.size or evidence.mesh is None:
         return program
     tunable = Tunable(program)
-    faces = faces_of(tunable.scene(tunable.values), evidence.mesh)
-    off, slopes = faces.off(tunable.poses(tunable.values))
-    slopes[:, tunable.are("angle").numpy()] = 0.0
-    robust: FloatArray = np.ones(len(off))
+    poses = tunable.poses(tunable.values)
+    faces = faces_of(poses.scene, evidence.mesh)
+    residuals, slopes = faces.residuals(poses)
+    # A box that is turned or sheared would leave all of its planes.
+    cuboids = poses.scene.kind == KINDS["cuboid"]
+    bent = tunable.are("angle") | (poses.slopes[cuboids, SIZES - 1] != 0).any(0)
+    slopes[:, bent.numpy()] = 0.0
+    # A weak prior for sizes as well: a small face has no more weight than the usual one.
+    prior = np.diag(FIT.place_prior * tunable.scale.numpy() ** 2)
+    robust: FloatArray = np.ones(len(residuals))
     for _ in range(FIT.reweighted):
         weighted = (robust * faces.weight)[:, None] * slopes
-        curvature = weighted.T @ slopes + np.diag(FIT.place_prior * tunable.scale.numpy() ** 2)
-        move = torch.from_numpy(np.linalg.solve(curvature, weighted.T @ off))
-        robust = 1 / (1 + ((off - slopes @ move.numpy()) / FIT.on_plane) ** 2)
-    return tunable.drawn((tunable.values - move).maximum(tunable.low))
+        move = torch.from_numpy(np.linalg.solve(weighted.T @ slopes + prior, weighted.T @ residuals))
+        robust = 1 / (1 + ((residuals - slopes @ move.numpy()) / FIT.on_plane) ** 2)
+    return tunable.with_values((tunable.values - move).maximum(tunable.low))

@@ -24,13 +24,13 @@ class FitSettings:
     same: float = 0.5  # least cosine between normals on one face
 
     # Straight faces on planes of a mesh
-    plane: float = 0.5  # distance within which a plane may be that of a face
-    near_plane: float = 0.25  # distance at which a plane counts 1/e of what it covers
-    covered: float = 0.3  # share of a face that its plane covers at least
+    plane_reach: float = 0.5  # distance within which a plane may be that of a face
+    plane_falloff: float = 0.25  # distance at which a plane counts 1/e of what it covers
+    covered: float = 0.3  # share of a face that its plane covers at least, discounted by that
     level: float = 0.9999  # cosine from which a triangle is perpendicular to an axis
-    one_plane: float = 0.01  # triangles with smaller steps are one plane
-    sheet: float = 0.05  # planes of both faces of a box that are less apart are a sheet, in the middle of the box
-    stays: float = 0.01  # weight of a face without a plane, against that of one which its plane covers
+    plane_step: float = 0.01  # triangles with smaller steps in between are one plane,
+    plane_width: float = 0.05  # if they are all within so much
+    uncovered: float = 0.01  # weight of a face without a plane, against that of one which its plane covers
     on_plane: float = 0.02  # distance from its plane at which a face has half its weight
     reweighted: int = 8  # solutions of reweighted least squares
 

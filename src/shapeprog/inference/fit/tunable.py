@@ -82,9 +82,9 @@ class Tunable:
 
     def settled(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers, rounded."""
-        return self.drawn(self.rounded(values))
+        return self.with_values(self.rounded(values))
 
-    def drawn(self, values: Float[Tensor, " F"]) -> Program:
+    def with_values(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers."""
         table = {key: to_float32(value) for key, value in zip(self.moving, values.tolist(), strict=True)}
         return _changed(self.program, lambda key, value: table.get(key, value))

@@ -42,14 +42,16 @@ class Misfit:
         angles = np.array([slot.kind == "angle" for slot in layout.slots])
         self.together: FloatArray = np.full(len(joints.pairs), TIES.together)  # weights of the squared gaps (C,)
         self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
-        # How far faces on planes of a mesh are from these (R,), how that follows from the numbers (R, P), and weights.
-        self.on_planes: list[FloatArray] = []
+        # Faces on planes of a mesh: their squared distances, weighted by area, are quadratic in the numbers; half the
+        # slope where all numbers are 0 (P,), and half the curvature (P, P).
+        count = len(layout.slots)
+        self.planes: tuple[FloatArray, FloatArray] = np.zeros(count), np.zeros((count, count))
         if evidence.mesh is not None:
             poses = layout.poses(layout.numbers)
             faces = faces_of(poses.scene, evidence.mesh)
-            off, moves = faces.off(poses)
-            on = np.abs(off) < FIT.on_plane
-            self.on_planes = [(off - moves @ layout.numbers)[on], moves[on], faces.weight[on]]
+            residuals, moves = faces.residuals(poses)
+            weighted = np.where(np.abs(residuals) < FIT.on_plane, faces.weight, 0.0)[:, None] * moves
+            self.planes = weighted.T @ (residuals - moves @ layout.numbers), weighted.T @ moves
 
     def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:
         """Half the slope (P,) and half the curvature (P, P) of the mean squared distance where the numbers are these
@@ -62,10 +64,7 @@ class Misfit:
             wide = torch.from_numpy(self.together[:, None]) * slopes
             slope = slope + (wide.T @ residual).numpy()
             curvature = curvature + (wide.T @ slopes).numpy()
-        if self.on_planes:
-            off, moves, weight = self.on_planes
-            slope = slope + (weight * (off + moves @ numbers)) @ moves
-            curvature = curvature + (weight[:, None] * moves).T @ moves
+        slope, curvature = slope + self.planes[0] + self.planes[1] @ numbers, curvature + self.planes[1]
         return slope + self.prior * (numbers - self.start), curvature + np.diag(self.prior)
 
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:

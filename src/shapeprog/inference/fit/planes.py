@@ -106,7 +106,7 @@ def on_planes(program: Program, evidence: Evidence) -> Program:
     cuboids = poses.scene.kind == KINDS["cuboid"]
     bent = tunable.are("angle") | (poses.slopes[cuboids, SIZES - 1] != 0).any(0)
     slopes[:, bent.numpy()] = 0.0
-    # A weak prior for sizes as well: a small face has no more weight than the usual one.
+    # The prior of places holds sizes as well: that of sizes outweighs the area of a small face.
     prior = np.diag(FIT.place_prior * tunable.scale.numpy() ** 2)
     robust: FloatArray = np.ones(len(residuals))
     for _ in range(FIT.reweighted):

@@ -24,7 +24,7 @@ class FitSettings:
     same: float = 0.5  # least cosine between normals on one face
 
     # Straight faces on planes of a mesh
-    plane_reach: float = 0.5  # distance within which a plane may be that of a face
+    plane_reach: float = 0.3  # distance within which planes are looked for: farther ones never count enough
     plane_falloff: float = 0.25  # distance at which a plane counts 1/e of what it covers
     covered: float = 0.3  # share of a face that its plane covers at least, discounted by that
     level: float = 0.9999  # cosine from which a triangle is perpendicular to an axis

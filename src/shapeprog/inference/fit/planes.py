@@ -15,6 +15,7 @@ import torch
 from shapeprog.geometry.mesh import triangle_normals
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import KINDS
+from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
@@ -23,6 +24,8 @@ from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.surface.oriented import Boxes
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
+
+LEAN = CUBOID.sizes.index("lean")  # slot of the lean of a cuboid; one that leans has faces along no axis
 
 
 class Faces(NamedTuple):
@@ -46,15 +49,15 @@ class Faces(NamedTuple):
 def faces_of(scene: Scene, mesh: Components) -> Faces:
     """The straight faces of the boxes of a scene (N,), and the planes of a mesh on which they should lie."""
     centre, half, rotation = (tensor.numpy() for tensor in (scene.centre, scene.reach, scene.rotation))
-    kind, upright = scene.kind.numpy(), scene.size[:, 3].numpy() == 0  # others have a lean
+    kind, upright = scene.kind.numpy(), scene.size[:, LEAN].numpy() == 0
     square = ((kind == KINDS["cuboid"]) & upright) | (kind == KINDS["rounded_box"])
     slots = np.flatnonzero(scene.mask.numpy() & square & Boxes(centre, rotation, half).straight).tolist()
     normals, corners = triangle_normals(mesh.vertices, mesh.faces)[1], mesh.vertices[mesh.faces]
     rows = list[tuple[int, int, int, float, float]]()
     for axis in range(3):
-        level = np.flatnonzero(np.abs(normals[:, axis]) >= FIT.level)
-        level = level[np.argsort(corners[level, :, axis].mean(1), kind="stable")]
-        height, flat = corners[level, :, axis].mean(1), np.delete(corners[level], axis, 2)
+        level = corners[np.abs(normals[:, axis]) >= FIT.level]
+        level = level[np.argsort(level[..., axis].mean(1), kind="stable")]
+        height, flat = level[..., axis].mean(1), np.delete(level, axis, 2)
         low, high = flat.min(1), flat.max(1)
         for slot in slots:
             middle, reach = np.delete(centre[slot], axis), np.delete(half[slot], axis)
@@ -104,7 +107,7 @@ def on_planes(program: Program, evidence: Evidence) -> Program:
     residuals, slopes = faces.residuals(poses)
     # A box that is turned or sheared would leave all of its planes.
     cuboids = poses.scene.kind == KINDS["cuboid"]
-    bent = tunable.are("angle") | (poses.slopes[cuboids, SIZES - 1] != 0).any(0)
+    bent = tunable.are("angle") | (poses.slopes[cuboids, LEAN] != 0).any(0)
     slopes[:, bent.numpy()] = 0.0
     # The prior of places holds sizes as well: that of sizes outweighs the area of a small face.
     prior = np.diag(FIT.place_prior * tunable.scale.numpy() ** 2)

@@ -31,7 +31,7 @@ class FitSettings:
     plane_step: float = 0.01  # triangles with smaller steps in between are one plane,
     plane_width: float = 0.05  # if they are all within so much
     uncovered: float = 0.01  # weight of a face without a plane, against that of one which its plane covers
-    on_plane: float = 0.02  # distance from its plane at which a face has half its weight
+    on_plane: float = 0.02  # distance from its plane at which a face has half its weight, and up to which ties hold it
     reweighted: int = 8  # solutions of reweighted least squares
 
 

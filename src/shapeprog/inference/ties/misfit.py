@@ -55,7 +55,7 @@ class Misfit:
 
     def at(self, numbers: FloatArray, draws: int, *, joined: bool = False) -> tuple[FloatArray, FloatArray]:
         """Half the slope (P,) and half the curvature (P, P) of the mean squared distance where the numbers are these
-        (P,), with the prior, and with gaps at joints if joined; pairs of points are drawn so many times."""
+        (P,), with the prior, faces on planes, and gaps at joints if joined; pairs of points are drawn so many times."""
         poses = self.layout.poses(numbers)
         systems = [of_target(poses, self.target.pairs(poses.scene, self.generator), self.width) for _ in range(draws)]
         slope, curvature = (sum(parts).numpy() / draws for parts in zip(*systems, strict=True))

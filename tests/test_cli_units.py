@@ -14,13 +14,14 @@ from commands import FRAME, PROGRAM, Run, table
 
 from shapeprog import inference
 from shapeprog.formats import export, load, load_with_frame
-from shapeprog.inference.readable import in_readable_unit, unit_of_result
+from shapeprog.inference.infer import unit_of_result
 from shapeprog.language.convert import placed
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.free import numbers
 from shapeprog.language.named import names
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import source_of
+from shapeprog.language.readable import in_readable_unit
 from shapeprog.language.unit import Unit
 from shapeprog.language.unroll import unroll
 

@@ -36,11 +36,11 @@ def tidy_command(
     """
     from shapeprog.formats import save
     from shapeprog.formats.frames import asked_unit
-    from shapeprog.inference.readable import in_readable_unit
     from shapeprog.inference.surface.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.ast import Function
     from shapeprog.language.free import numbers
+    from shapeprog.language.readable import in_readable_unit
     from shapeprog.library import joined, with_library
 
     terminal.check_units(unit, file_unit, needed=True)

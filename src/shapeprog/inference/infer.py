@@ -31,7 +31,6 @@ from shapeprog.inference.cells.reconstruct import description_length, reconstruc
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.fit.tunable import Tunable
-from shapeprog.inference.readable import CELLS, in_readable_unit, unit_of_result
 from shapeprog.inference.roles.roles import named_anew, note_on_front
 from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
 from shapeprog.inference.ties.tying import tie
@@ -40,7 +39,8 @@ from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.free import numbers
 from shapeprog.language.merging import merged
 from shapeprog.language.program import Program
-from shapeprog.language.unit import metres
+from shapeprog.language.readable import in_readable_unit
+from shapeprog.language.unit import Unit, metres
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, joined, with_library
 
@@ -51,6 +51,8 @@ SURFACE_KERNELS = (
 )  # fmt: skip
 CELL_KERNELS = "geometry/cell", "inference/cells/"
 """Where the kernels of the search on the surface and of that on cells are; those with the same helpers together."""
+
+CELLS = "cells"  # the word for lengths in cells of the grid
 
 
 @dataclass(frozen=True)
@@ -218,3 +220,15 @@ def prepare_kernels(*, cells: bool = False) -> None:
     No time budget pays for it.  The first call on a machine takes seconds, the first in a process a fraction of one.
     """
     prepare(modules_of(*SURFACE_KERNELS, *(CELL_KERNELS if cells else ())))
+
+
+def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | None:
+    """The unit in which a program that was inferred from a shape is written, by its name, or ``cells``.
+
+    Without a name it is that of the file, which may have none.  Voxels are then left in cells unless somebody has named
+    the unit of the file.  Statements in cells have no unit.
+    """
+    plain_voxels = shape.kind == "voxels" and not (name or shape.unit)
+    if name == CELLS or plain_voxels or program.scale is None:
+        return None
+    return Unit.of(shape.frame, name, shape.file_unit) if name else Unit(shape.file_unit, shape.frame.scale)

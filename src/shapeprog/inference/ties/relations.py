@@ -227,6 +227,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
     else:
         meet = face.facing * other.facing == -1
         if touches and (face.facing != other.facing or all(points)):
-            yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()))
+            limit = TIES.within if meet or all(points) else TIES.end_within
+            yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()), limit)
         elif face.facing == other.facing and (single or touches):
             yield Relation(row, TIES.equal if single else TIES.equal / 2)

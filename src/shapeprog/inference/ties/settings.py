@@ -47,6 +47,7 @@ class TieSettings:
 
     # By how much a relation may be off
     within: float = 0.3  # lengths
+    end_within: float = 0.15  # the end of a rod, from a face that it touches
     plane: float = 0.1  # planes of mirrors off the middle
     degrees: float = 2.0  # angles; also of bars about themselves whose sides follow those of the whole
     alike: float = 0.25  # equal sizes, as a share of the larger

@@ -9,38 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.choice.connecting import floating
+from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.language.dimensions import in_unit, literal_lengths
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unit import Unit
-from shapeprog.language.unroll import Plan
+from shapeprog.language.unroll import Plan, unroll
 
 TOLERANCES = (0.015, 0.01, 0.004, 0.001)  # how far a face may move, in cells; the smaller ones where parts come apart
 IN_CELLS = TOLERANCES[2:]  # the tolerances for programs in cells
 STEP = 4e-3  # change of a number, in cells, by which slopes are measured
 ROUNDING = 1e-5  # cells that float32 may add to a move
-
-CELLS = "cells"  # the word for lengths in cells of the grid
-
-
-def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | None:
-    """The unit in which a program that was inferred from a shape is written, by its name, or ``cells``.
-
-    Without a name it is that of the file, which may have none.  Voxels are then left in cells unless somebody has named
-    the unit of the file.  Statements in cells have no unit.
-    """
-    plain_voxels = shape.kind == "voxels" and not (name or shape.unit)
-    if name == CELLS or plain_voxels or program.scale is None:
-        return None
-    return Unit.of(shape.frame, name, shape.file_unit) if name else Unit(shape.file_unit, shape.frame.scale)
 
 
 def in_readable_unit(program: Program, unit: Unit | None) -> Program:
@@ -55,12 +41,17 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     exact = in_unit(program, unit)
     if not 0 < exact.size <= 256:  # rounding takes long for more primitives
         return exact
-    loose = len(floating(program))
+    loose = _loose(program)
     for tolerance in TOLERANCES if unit is not None else IN_CELLS:
         result = _rounded(exact, tolerance)
-        if result is not None and len(floating(result)) <= loose:
+        if result is not None and _loose(result) <= loose:
             return result
     return exact
+
+
+def _loose(program: Program) -> int:
+    """How many parts are outside the largest connected solid."""
+    return int(np.count_nonzero(pieces_of_parts(unroll(program))))
 
 
 def _rounded(program: Program, tolerance: float) -> Program | None:

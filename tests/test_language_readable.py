@@ -20,11 +20,12 @@ from shapeprog.formats import export, load_with_frame, save
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.inference import Settings, infer
 from shapeprog.inference.choice.connecting import floating
-from shapeprog.inference.readable import TOLERANCES, in_readable_unit, unit_of_result
+from shapeprog.inference.infer import unit_of_result
 from shapeprog.language.convert import placed
 from shapeprog.language.named import names
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
+from shapeprog.language.readable import TOLERANCES, in_readable_unit
 from shapeprog.language.unit import METRES, Unit
 from shapeprog.language.unroll import unroll
 from shapeprog.space import SPAN, Frame, grid_axes

@@ -19,7 +19,7 @@ from shapeprog.inference.candidates.neighbours import neighbours, recounted, res
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import choose, explained, missed, value
 from shapeprog.inference.choice.connecting import connected
-from shapeprog.inference.choice.coverage import Coverage, CoverageTable
+from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.planes import on_planes
 from shapeprog.inference.fit.snapping import snapped
@@ -44,12 +44,7 @@ class Assembly(NamedTuple):
 
 
 def assemble(
-    coverage: Coverage,
-    *,
-    blocks: int = 10,
-    seed: int = 0,
-    deadline: Deadline = NEVER,
-    progress: Progress | None = None,
+    coverage: Coverage, *, blocks: int = 10, seed: int = 0, deadline: Deadline = NEVER, progress: Progress | None = None
 ) -> Assembly:
     """A program of at most ``blocks`` blocks for the surface of a mesh or a point cloud; the same for the same seed.
 
@@ -70,7 +65,7 @@ def assemble(
     program = canonical_side(simplest(program))
     program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)
-    table = _table([*program.body, *others[:1]], coverage)
+    table = coverage.table([*program.body, *others[:1]])
     share, more = (explained(table, range(number)) for number in (count, len(table.prices)))
     return Assembly(program, share, _reason(count, blocks, share, more - share, others))
 
@@ -110,7 +105,7 @@ def _choice(
     nodes: list[Node], coverage: Coverage, blocks: int, seed: int, start: Sequence[int] = ()
 ) -> tuple[list[Node], list[Node]]:
     """The most valuable blocks, and the others, those that would explain most of the rest first."""
-    table = _table(nodes, coverage)
+    table = coverage.table(nodes)
     chosen = choose(table, blocks, start=start, seed=seed)
     return [nodes[index] for index in chosen], [nodes[index] for index in missed(table, chosen)]
 
@@ -122,12 +117,11 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     the error of the coverage; and a row loses a copy that costs nothing, such as a shelf inside the top.
     """
     options = [(index, node, 0.005) for index, node in enumerate(start.body)]
-    solids = solid_boxes(adjusted.draws)
-    for index, (block, chain) in enumerate(zip(adjusted.body, adjusted.chains, strict=True)):
-        options += [(index, node, -0.001) for node in shorter(block)]
-        options += [(index, node, -0.00001) for node in recounted(chain, solids[index], -1)]
+    for index, (chain, solids) in enumerate(zip(adjusted.chains, solid_boxes(adjusted.draws), strict=True)):
+        options += [(index, node, -0.001) for node in shorter(chain)]
+        options += [(index, node, -0.00001) for node in recounted(chain, solids, -1)]
     nodes = [*adjusted.body, *(node for _, node, _ in options)]
-    table, selected = _table(nodes, coverage), tuple(range(len(start.body)))
+    table, selected = coverage.table(nodes), tuple(range(len(start.body)))
     text = [(price, Program((node,)).size) for price, node in zip(table.prices, nodes, strict=True)]
     for option, (index, _, least) in enumerate(options, len(selected)):
         trial = (*selected[:index], option, *selected[index + 1 :])
@@ -135,10 +129,6 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
         if (least > 0 or cheaper) and value(table, trial) > value(table, selected) + least:
             selected = trial
     return Program(tuple(nodes[option] for option in selected))
-
-
-def _table(nodes: Sequence[Node], coverage: Coverage) -> CoverageTable:
-    return coverage.table([Program((node,)) for node in nodes])
 
 
 def _reason(used: int, allowed: int, share: float, gain: float, others: Sequence[Node]) -> str:

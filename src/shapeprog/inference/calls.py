@@ -60,7 +60,7 @@ def with_calls(program: Program, library: Library, coverage: Coverage) -> tuple[
     patterns = [item for item in library.patterns if item.shortens and item.blocks > 1]
     candidates = [candidate for pattern in patterns for candidate in _candidates(pattern, options)]
     candidates.sort(key=lambda candidate: (-len(candidate.replaced), candidate.difference))
-    table = coverage.table([*(Program((node,)) for node in nodes), *(candidate.program for candidate in candidates)])
+    table = coverage.table([*nodes, *(candidate.program for candidate in candidates)])
     selected, drawn, loose = frozenset(range(len(nodes))), set[int](), len(floating(Program(tuple(nodes))))
     for index, candidate in enumerate(candidates, len(nodes)):
         trial = selected.difference(candidate.replaced) | {index}

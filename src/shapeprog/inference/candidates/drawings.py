@@ -9,7 +9,6 @@ from itertools import product
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
@@ -77,16 +76,8 @@ def scene_of(nodes: Sequence[Node]) -> Scene:
 def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
     """The boxes around all solids of each block."""
     scene = scene_of(nodes)
-    centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
-    return [
-        [Box(centre[row, slot], rotation[row, slot], half[row, slot]) for slot in np.flatnonzero(mask)]
-        for row, mask in enumerate(scene.mask.numpy())
-    ]
-
-
-def single_boxes(nodes: Sequence[Node]) -> list[Box | None]:
-    """The box around the solid of each block, ``None`` where there is not exactly one."""
-    return [solids[0] if len(solids) == 1 else None for solids in solid_boxes(nodes)]
+    fields = [tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds)]
+    return [list(map(Box, *(field[row, mask] for field in fields))) for row, mask in enumerate(scene.mask.numpy())]
 
 
 def simplest(program: Program) -> Program:
@@ -95,15 +86,14 @@ def simplest(program: Program) -> Program:
 
     Blocks are unchanged if their statement has a pivot or does not draw exactly one solid.
     """
-    draws, boxes = program.draws, single_boxes(program.draws)
-    turned = [language()[draw.name].pivot is not None for draw in draws]
-    options = [[] if box is None or pivot else drawings(box) for box, pivot in zip(boxes, turned, strict=True)]
     plain = []
-    for draw, same in zip(draws, _drawing_the_same(draws, options, np.ones((len(draws), 3))), strict=True):
-        if not same or is_unhinted(language()[draw.name]):  # those of the paper are written as a solid with a role
+    for draw, solids in zip(program.draws, solid_boxes(program.draws), strict=True):
+        declared = language()[draw.name]
+        same = [] if len(solids) != 1 or declared.pivot is not None else _drawing_the_same(draw, drawings(solids[0]))
+        if not same or is_unhinted(declared):  # those of the paper are written as a solid with a role
             same.append(draw)
         plain.append(min(same, key=numbers_written))
-    return _redrawn(program, plain)
+    return redrawn_by(program, plain)
 
 
 def canonical_side(program: Program) -> Program:
@@ -112,40 +102,31 @@ def canonical_side(program: Program) -> Program:
 
     Blocks are unchanged if their statement cannot draw the mirror image, or if they have loops other than mirrors.
     """
-    draws, boxes = program.draws, single_boxes(program.draws)
-    options, signs = [list[Draw]() for _ in draws], np.ones((len(draws), 3))
-    for row, ((*loops, draw), box, sign) in enumerate(zip(program.chains, boxes, signs, strict=True)):
-        if box is None or any(loop.name != "mirror" for loop in loops):
+    draws = program.draws
+    for index, ((*loops, _), solids) in enumerate(zip(program.chains, solid_boxes(draws), strict=True)):
+        if len(solids) != 1 or any(loop.name != "mirror" for loop in loops):
             continue
+        (box,), sign = solids, np.ones(3)
         for _, axis, offset in (loop.values for loop in loops):
             if offset == 0 and box.centre[int(axis)] < 0:
                 sign[int(axis)] = -1
         if (sign < 0).any():
             turn = sign[:, None] * box.rotation * [1, 1, sign.prod()]  # a box is its own image along its last axis
-            options[row] = drawings(Box(sign * box.centre, turn, box.half), draw.name)
-    same = _drawing_the_same(draws, options, signs)
-    return _redrawn(program, [found[0] if found else draw for found, draw in zip(same, draws, strict=True)])
+            images = drawings(Box(sign * box.centre, turn, box.half), draws[index].name)
+            draws[index] = next(iter(_drawing_the_same(draws[index], images, sign.tolist())), draws[index])
+    return redrawn_by(program, draws)
 
 
-def _redrawn(program: Program, draws: Sequence[Draw]) -> Program:
-    """The program with other drawing statements inside its loops."""
+def redrawn_by(program: Program, draws: Iterable[Draw]) -> Program:
+    """The program, one node for each block, with other drawing statements inside its loops."""
     return Program(tuple(nest((*chain[:-1], draw)) for chain, draw in zip(program.chains, draws, strict=True)))
 
 
-def _drawing_the_same(draws: Sequence[Draw], options: Sequence[Sequence[Draw]], signs: FloatArray) -> list[list[Draw]]:
-    """Those options for each drawing that draw the same, or its mirror image by signs (B, 3) of the coordinates; with
-    its role.  Drawings with options are one solid each."""
-    same, points, limits = [list[Draw]() for _ in draws], list[Tensor](), list[float]()
-    pairs = [(k, option) for k, row in enumerate(options) for option in row]
-    if not pairs:
-        return same
-    for scene, row, sign in zip(scene_of(draws), options, torch.from_numpy(signs), strict=True):
-        if row:  # one seed for each: the sample does not depend on the other drawings
-            sample = sample_surface(scene, SETTINGS.points, torch.Generator().manual_seed(0))
-            points += [sample.points * sign] * len(row)
-            limits += [SETTINGS.equal_share * float(scene.bounds[scene.mask].min())] * len(row)
-    off = signed_distance(scene_of([option for _, option in pairs]), torch.stack(points)).abs().amax(-1).tolist()
-    for (k, option), far, limit in zip(pairs, off, limits, strict=True):
-        if far < min(SETTINGS.equal_distance, limit):
-            same[k].append(replace(option, role=draws[k].role))
-    return same
+def _drawing_the_same(draw: Draw, options: Sequence[Draw], sign: Sequence[float] = (1, 1, 1)) -> list[Draw]:
+    """Those options that draw the same solid as a statement, or its mirror image by signs of the coordinates; with its
+    role."""
+    (scene,) = scene_of([draw])
+    sample = sample_surface(scene, SETTINGS.points, torch.Generator().manual_seed(0))
+    limit = min(SETTINGS.equal_distance, SETTINGS.equal_share * float(scene.bounds[scene.mask].min()))
+    off = signed_distance(scene_of(options), sample.points * torch.tensor(sign)).abs().amax(-1)
+    return [replace(option, role=draw.role) for option, far in zip(options, off.tolist(), strict=True) if far < limit]

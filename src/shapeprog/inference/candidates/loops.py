@@ -7,7 +7,6 @@ with the surface.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -150,27 +149,24 @@ def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
     """Rows along an axis of boxes of one size that belong to several blocks, such as rungs, slats and shelves."""
     boxes = [box for parts in blocks for box in parts]
     owner = np.repeat(np.arange(len(blocks)), [len(parts) for parts in blocks])
-    centre = np.array([box.centre for box in boxes])
-    half = np.array([np.abs(box.rotation) @ box.half for box in boxes])
-    existing: set[tuple[int, ...]] = set()
-    for axis, first in itertools.product(range(3), range(len(boxes))):
-        limit = np.maximum(SETTINGS.off_size, half[first] / 4)
-        limit[axis] = max(SETTINGS.off_size / 2, half[first, axis] / 2)
+    centre = np.reshape([box.centre for box in boxes], (-1, 3))
+    half = np.reshape([np.abs(box.rotation) @ box.half for box in boxes], (-1, 3))
+    for axis in range(3):
         across = np.arange(3) != axis
-        similar = (np.abs(half - half[first]) <= limit).all(1)
-        similar &= (np.abs(centre - centre[first])[:, across] <= SETTINGS.stray).all(1)
-        members = np.flatnonzero(similar)[: SETTINGS.most_alike]
-        key = (axis, *members.tolist())
-        if len(members) < SETTINGS.least_row or len(set(owner[members])) < 2 or key in existing:
-            continue
-        existing.add(key)
-        middle, size = np.median(centre[members], 0), np.maximum(np.median(half[members], 0), THINNEST / 2)
-        positions = np.where(across, middle, centre[members])
-        run = max(equal_steps(positions, size * ~across), key=len, default=[])
-        if SETTINGS.least_row <= len(run) <= SETTINGS.most_row:
-            start, end = positions[run[0]], positions[run[-1]]
-            for drawing in drawings(Box(start, np.eye(3), size)):
-                yield _translated(drawing, len(run), (end - start) / (len(run) - 1))
+        limit = np.where(across, np.maximum(SETTINGS.off_size, half / 4), np.maximum(SETTINGS.off_size / 2, half / 2))
+        similar = (np.abs(half[:, None] - half) <= limit[:, None]).all(2)
+        similar &= (np.abs(centre[:, None] - centre)[..., across] <= SETTINGS.stray).all(2)
+        for group in dict.fromkeys(tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in similar):
+            members = list(group)
+            if len(members) < SETTINGS.least_row or len(set(owner[members])) < 2:
+                continue
+            middle, size = np.median(centre[members], 0), np.maximum(np.median(half[members], 0), THINNEST / 2)
+            positions = np.where(across, middle, centre[members])
+            run = max(equal_steps(positions, size * ~across), key=len, default=[])
+            if SETTINGS.least_row <= len(run) <= SETTINGS.most_row:
+                start, end = positions[run[0]], positions[run[-1]]
+                for drawing in drawings(Box(start, np.eye(3), size)):
+                    yield _translated(drawing, len(run), (end - start) / (len(run) - 1))
 
 
 def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:

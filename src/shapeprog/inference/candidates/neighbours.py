@@ -33,8 +33,6 @@ from shapeprog.space import DEPTH, SIDE, FloatArray
 def neighbours(program: Program) -> list[Node]:
     """Variants of the blocks of a program, whose nodes are one block each, without duplicates and existing blocks."""
     chains = program.chains
-    if not chains:
-        return []
     # What each block draws with all of its loops, without the outermost, and so on.
     inner = iter(solid_boxes([nest(chain[index:]) for chain in chains for index in range(len(chain))]))
     drawn = [[next(inner) for _ in chain] for chain in chains]
@@ -52,30 +50,26 @@ def neighbours(program: Program) -> list[Node]:
             result += [*recounted(chain, [box], -1), *recounted(chain, [box], 1)]
             for level, solids in enumerate(drawn[index][:-1]):  # a board instead of a run
                 result += [nest((*chain[:level], drawing)) for drawing in drawings(_around(solids[0], solids))]
-    for (chain, box), (other, other_box) in itertools.combinations(zip(chains, boxes, strict=True), 2):
-        if box is not None and other_box is not None and _loops(chain) == _loops(other):
-            for around in _merged(box, other_box):
-                result += [nest((*chain[:-1], drawing)) for drawing in drawings(around)]
+    loops = [[(loop.name, loop.values[0]) for loop in chain[:-1]] for chain in chains]
+    for (chain, box, around), (_, other, others) in itertools.combinations(zip(chains, boxes, loops, strict=True), 2):
+        if box is not None and other is not None and around == others:
+            for merged in _merged(box, other):
+                result += [nest((*chain[:-1], drawing)) for drawing in drawings(merged)]
     existing = set(program.body)
     return [node for node in dict.fromkeys(result) if node not in existing]
 
 
-def shorter(node: Node) -> Iterator[Node]:
+def shorter(chain: Chain) -> Iterator[Node]:
     """A block without one of its loops, and rows of the copies that several loops draw."""
-    (chain,) = Program((node,)).chains
     yield from _unlooped(chain)
     if len(chain) > 2:
-        yield from rows([[box] for box in solid_boxes([node])[0]])
+        yield from rows([[box] for box in solid_boxes([nest(chain)])[0]])
 
 
 def redrawn(chain: Chain, box: Box) -> Iterator[Node]:
     """A block whose statement draws another box inside its loops; by all statements if its hint gives none."""
     for drawing in drawings(box, chain[-1].name) or drawings(box):
         yield nest((*chain[:-1], drawing))
-
-
-def _loops(chain: Chain) -> tuple[tuple[str, int], ...]:
-    return tuple((node.name, node.count) for node in chain[:-1] if isinstance(node, Loop))
 
 
 def _unlooped(chain: Chain) -> Iterator[Node]:
@@ -107,8 +101,7 @@ def recounted(chain: Chain, boxes: Sequence[Box], more: int) -> Iterator[Node]:
 
 def _merged(first: Box, second: Box) -> Iterator[Box]:
     """The box around two boxes that nearly touch, with the orientation of the larger."""
-    if first.half.prod() < second.half.prod():
-        first, second = second, first
+    first, second = sorted((first, second), key=lambda box: -float(box.half.prod()))
     apart = np.abs((second.centre - first.centre) @ first.rotation)
     if (apart <= first.half + _reach(first, second) + SETTINGS.gap).all():
         yield _around(first, [first, second])

@@ -33,8 +33,8 @@ from shapeprog.space import Array, FloatArray
 def single_candidates(pieces: Pieces) -> list[Node]:
     """The simplest drawing statement for every piece with points, in the order of the pieces, and a closer one."""
     points, normals, indices = _target(pieces)
-    half = np.maximum(pieces.boxes.half, THINNEST / 2)
-    boxes = [Box(pieces.boxes.centre[piece], pieces.boxes.rotation[piece], half[piece]) for piece in indices]
+    found = pieces.boxes.take(indices)
+    boxes = list(map(Box, found.centre, found.rotation, np.maximum(found.half, THINNEST / 2)))
     tried = [drawings(box) for box in boxes]
     for declared in filter(is_unhinted, language()):
         for box, options in zip(boxes[: SETTINGS.fitted], tried, strict=False):

@@ -5,6 +5,7 @@ Furniture is one piece.  The share explained is hardly affected by a gap of one 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from functools import lru_cache
 
@@ -23,60 +24,48 @@ from shapeprog.language.unroll import unroll
 
 
 def connected(program: Program, coverage: Coverage) -> Program:
-    """A program of one block per node, with floating parts extended to others or removed where little value is lost."""
-    while (better := _better_connected(program, coverage)) is not None:
-        program = better
-    return program
+    """A program of one block per node, with floating parts extended to others or removed where little value is lost.
 
-
-def _better_connected(program: Program, coverage: Coverage) -> Program | None:
-    """The most valuable program with one block changed or removed and fewer floating parts, if the loss is small."""
-    loose = _loose_parts(program)
-    count = sum(map(sum, loose))
+    One block after another is changed or removed, each time to the most valuable program with fewer floating parts.
+    """
+    count = sum(lone for _, lone in _parts(program))
     if not count:
-        return None
-    every = [program, *_options(program, loose)]
+        return program
+    every = [program, *_options(program)]
     nodes = dict.fromkeys(node for option in every for node in option.body)
-    index = {node: number for number, node in enumerate(nodes)}
-    table = coverage.table([Program((node,)) for node in nodes])
+    table, index = coverage.table([*nodes]), {node: number for number, node in enumerate(nodes)}
     start, *values = (value(table, tuple(index[node] for node in option.body)) for option in every)
     order = np.argsort(np.negative(values), kind="stable")[: SETTINGS.ways].tolist()
     limits = [SETTINGS.floating if option.blocks == program.blocks else SETTINGS.removed for option in every[1:]]
     likely = [every[1 + number] for number in order if values[number] >= start - limits[number]]
     groups = contact_groups(unroll([program, *likely]))  # in less time than unions take
     fewer = (option for option, number in zip(likely, groups[1:], strict=True) if number < groups[0] or groups[0] == 1)
-    return next((option for option in fewer if sum(map(sum, _loose_parts(option))) < count), None)
+    better = next((option for option in fewer if sum(lone for _, lone in _parts(option)) < count), None)
+    return program if better is None else connected(better, coverage)
 
 
 def floating(program: Program) -> list[int]:
     """Which blocks have a part outside the largest connected solid of the program."""
-    return [block for block, parts in enumerate(_loose_parts(program)) if any(parts)]
+    return sorted({block for block, lone in _parts(program) if lone})
 
 
 @lru_cache(maxsize=64)
-def _loose_parts(program: Program) -> list[list[bool]]:
-    """For every part of every block, whether it is outside the largest connected solid."""
-    loose: list[list[bool]] = [[] for _ in range(program.blocks)]
+def _parts(program: Program) -> list[tuple[int, bool]]:
+    """The block of every part, and whether that is outside the largest connected solid."""
     scene = unroll(program)
-    for block, piece in zip(scene.block.tolist(), pieces_of_parts(scene).tolist(), strict=True):
-        loose[block].append(piece != 0)
-    return loose
+    return list(zip(scene.block.tolist(), (pieces_of_parts(scene) != 0).tolist(), strict=True))
 
 
-def _options(program: Program, loose: list[list[bool]]) -> list[Program]:
+def _options(program: Program) -> list[Program]:
     """Programs without one floating block, and programs with one block extended to join floating and other parts."""
-    body, chains, options = program.body, program.chains, list[Program]()
+    body, chains, options, loose = program.body, program.chains, list[Program](), floating(program)
     originals = solid_boxes([chain[-1] for chain in chains])
-    parts = [
-        (owner, box, lone)
-        for owner, (boxes, floats) in enumerate(zip(solid_boxes(body), loose, strict=True))
-        for box, lone in zip(boxes, floats, strict=True)
-    ]
+    parts = list(zip(itertools.chain(*solid_boxes(body)), _parts(program), strict=True))
     for index, chain in enumerate(chains):
-        ways: list[tuple[Node, ...]] = [()] if any(loose[index]) else []
+        ways: list[tuple[Node, ...]] = [()] if index in loose else []
         for side in (True, False) if len(originals[index]) == 1 else ():
-            copies = [box for owner, box, lone in parts if owner == index and lone is side]
-            others = [box for owner, box, lone in parts if owner != index and lone is not side]
+            copies = [box for box, (owner, lone) in parts if owner == index and lone is side]
+            others = [box for box, (owner, lone) in parts if owner != index and lone is not side]
             longer = _reaching(chain, originals[index][0], copies, others)
             ways += [(node,) for node in longer if node not in body]
         options += [Program((*body[:index], *way, *body[index + 1 :])) for way in dict.fromkeys(ways)]

@@ -106,11 +106,12 @@ class Coverage:
         self._index: dict[Program, int] = {}
         self._rows: list[Array] = []
 
-    def table(self, candidates: Sequence[Program]) -> CoverageTable:
-        """The coverage of candidates.
+    def table(self, blocks: Sequence[Node | Program]) -> CoverageTable:
+        """The coverage of candidates, which are nodes or programs.
 
         A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
         """
+        candidates = [block if isinstance(block, Program) else Program((block,)) for block in blocks]
         scene = unroll(candidates).detach()
         new = [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._index]
         if new or not self._rows:
@@ -157,7 +158,7 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64
     share = (scene.mask / scene.mask.sum(1, keepdim=True).clamp(min=1)).numpy()
     middle = np.einsum("bn,bni->bi", share, scene.centre.numpy())
     around = [[any(_around(node, axis) for node in program.walk()) for axis in (DEPTH, SIDE)] for program in candidates]
-    near = np.abs(middle[:, [DEPTH, SIDE]]) < SETTINGS.centred
+    near = np.abs(middle[:, [DEPTH, SIDE]]) < SETTINGS.even
     return np.sum(near & ~np.reshape(around, near.shape).astype(np.bool_), 1)
 
 
@@ -172,7 +173,7 @@ def square(scene: Scene) -> npt.NDArray[np.bool_]:
     Without this, a round bar is cheaper than a square one.
     """
     sides = np.sort(2 * scene.bounds[:, :1].numpy(), 2)
-    bars = (scene.kind[:, :1].numpy() == KINDS["cuboid"]) & (sides[..., 1] - sides[..., 0] < SETTINGS.square)
+    bars = (scene.kind[:, :1].numpy() == KINDS["cuboid"]) & (sides[..., 1] - sides[..., 0] < SETTINGS.even)
     return np.any(bars, 1)
 
 

@@ -30,9 +30,8 @@ class Settings:
     agreement: float = 0.8  # with at least this cosine between the normals
     free_points: int = 2048  # points drawn in free space
     parts: int = 16  # parts of a mesh from which the value of all is constant: a lattice is not drawn at any price
-    centred: float = 0.1  # distance within which a candidate is in the middle
+    even: float = 0.1  # distance from the middle, and difference of the sides of a section, that count as none
     outside: float = 0.5  # distance beyond the box around the target from which a candidate is outside
-    square: float = 0.1  # difference of the sides of a section up to which it is square
 
 
 SETTINGS = Settings()

@@ -19,7 +19,7 @@ from shapeprog.space import FloatArray
 
 def limbs(cloud: Cloud) -> Boxes:
     """Boxes around the limbs with the most points."""
-    which: IntArray = np.arange(0, len(cloud.points), -(-len(cloud.points) // SETTINGS.ball_points))
+    which: IntArray = np.arange(0, len(cloud.points), -(-len(cloud.points) // SETTINGS.tested))
     centre, radius = _inner_balls(cloud, which)
     fine = (radius > 0) & (radius < SETTINGS.ball_radius)
     which, centre, radius = which[fine], centre[fine], radius[fine]
@@ -29,7 +29,7 @@ def limbs(cloud: Cloud) -> Boxes:
     count = min(SETTINGS.limb_neighbours, len(centre))
     distance, nearest = cKDTree(centre).query(centre, k=range(1, count + 1), workers=2)
     reach = 2 * radius[:, None] + 2.5 * SETTINGS.merged
-    close = (distance < reach) & (np.abs(np.log(radius[nearest] / radius[:, None])) < 2 * SETTINGS.merged_radius)
+    close = (distance < reach) & (np.abs(np.log(radius[nearest] / radius[:, None])) < 2 * SETTINGS.merged)
     weight = close.astype(np.float64)[..., None]
     off = (centre[nearest] - (centre[nearest] * weight).sum(1, keepdims=True) / weight.sum(1, keepdims=True)) * weight
     spread, axes = np.linalg.eigh(off.transpose(0, 2, 1) @ off)
@@ -47,7 +47,7 @@ def limbs(cloud: Cloud) -> Boxes:
 
 def _merged(centre: FloatArray, radius: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Balls with about the same centre and radius merged: the new index of each, new centres and radii."""
-    cells = np.column_stack([centre / SETTINGS.merged, np.log(radius) / SETTINGS.merged_radius])
+    cells = np.column_stack([centre / SETTINGS.merged, np.log(radius) / SETTINGS.merged])
     _, name, count = np.unique(np.round(cells).astype(np.int64), axis=0, return_inverse=True, return_counts=True)
     name = name.reshape(-1)
     mean = [np.bincount(name, column) / count for column in (*centre.T, radius)]

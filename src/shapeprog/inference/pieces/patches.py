@@ -29,9 +29,7 @@ def planar_patches(cloud: Cloud) -> Boxes:
     order = np.argsort(np.round(1 - facing.mean(1), 6), kind="stable")
     label = np.full(len(cloud.points), -1)
     cosine = np.cos(np.radians(25 if cloud.noise > SURFACE.noisy else 15))
-    grow_patches(
-        cloud.points, cloud.normals, cloud.neighbours, order, cosine, cloud.tolerance, SETTINGS.patch_points, label
-    )
+    grow_patches(*cloud[:3], order, cosine, cloud.tolerance, SETTINGS.patch_points, label)
     by_patch = np.split(cloud.points[np.argsort(label, kind="stable")], np.cumsum(np.bincount(label + 1))[:-1])[1:]
     sets = sorted(by_patch, key=len, reverse=True)[: SETTINGS.patches]
     if not sets:

@@ -55,7 +55,7 @@ class Support:
     """
 
     def __init__(self, cloud: Cloud, boxes: Boxes) -> None:
-        every = -(-len(cloud.points) // SETTINGS.cover_points)
+        every = -(-len(cloud.points) // SETTINGS.tested)
         distance = max(SETTINGS.cover_distance, 2 * cloud.noise)
         self.explained, fill = near(boxes, cloud.points[::every], distance)
         self.filled = fill >= SETTINGS.cover_filled

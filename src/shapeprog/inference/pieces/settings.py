@@ -21,7 +21,7 @@ class Settings:
     same: float = 0.25  # difference in position and size below which pieces are the same; components never are
 
     # Selection of boxes that explain the points together
-    cover_points: int = 5000  # points that are tested
+    tested: int = 5000  # points that are tested here, and whose inner balls are computed
     cover_distance: float = 0.2  # distance from the surface of a box within which it explains a point
     cover_price: float = 0.6  # price of surface where no point is, against that of explained points
     cover_filled: float = 0.35  # least share of the surface with points nearby: the box around a chair is mostly air
@@ -46,10 +46,8 @@ class Settings:
     stretch: float = 1.6  # thickness as a multiple of the middle side, at most: else other faces describe it better
 
     # Limbs, from the balls that fit in a solid
-    ball_points: int = 5000  # points whose balls are computed
     ball_radius: float = 3.0  # radius of the largest
-    merged: float = 0.25  # distance within which balls are merged
-    merged_radius: float = 0.25  # difference of the logarithms of the radii within which balls are merged
+    merged: float = 0.25  # distance, and difference of the logarithms of the radii, within which balls are merged
     limb_neighbours: int = 24  # neighbouring centres from which a direction is estimated
     linear: float = 0.3  # standard deviation across a line of centres, as a share of that along it, at most
     bend: float = 25.0  # angle between directions of neighbours in one limb, at most

@@ -67,14 +67,13 @@ class Parts:
         self.upright: Mask = self.slender & (self.rise >= 0.75)
         self.level: Mask = self.slender & (self.rise <= 0.35)
         self.board: Mask = (self.thin <= 0.3 * self.middle) & ~bent
-        self.facing_front: Mask = self.board & ~self.slender & (self.depth == self.thin)
+        self.facing: Mask = self.board & (self.depth == self.thin)  # to the front
         self.small: Mask = self.long <= 0.12 * self.size.max()
         self.tiny: Mask = self.up * self.side <= 0.012 * self.size[UP] * self.size[SIDE]  # seen from the front
         self.tiny &= self.depth <= self.size[DEPTH] / 4
         stubby = (self.depth <= self.size[DEPTH] / 4) & (self.side <= self.size[SIDE] / 4)
         self.stubby: Mask = stubby & (self.up >= np.maximum(self.depth, self.side))
-        volume = self.up * self.face / max(float(self.size.prod()), 1e-9)
-        self.bulky: Mask = volume >= 0.3
+        self.bulky: Mask = self.up * self.face >= 0.3 * max(float(self.size.prod()), 1e-9)
         sizes = np.round(np.stack([self.up, self.depth, self.side], 1) / self.near).astype(np.int64)
         _, kind, copies = np.unique(sizes, axis=0, return_inverse=True, return_counts=True)
         self.equal = copies[kind.reshape(-1)]  # how many parts have about the same extents
@@ -125,10 +124,9 @@ class Parts:
         self.below: Mask = ~self.main & (middle < bottom)
         self.rising: Mask = (self.top >= top + 2 * self.near) | (middle >= top)  # it ends clearly above
         self.highest: Mask = self.top >= self.floor + self.size[UP] - self.near
-        self.above: Mask = self.bottom >= top - 2 * self.near  # it begins there
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
-        across = self.facing_front | (self.level & (self.up > 2 * self.depth))
+        across = (self.facing & ~self.slender) | (self.level & (self.up > 2 * self.depth))
         self.head_or_foot: Mask = across & (self.span >= 0.5)  # a board across the head or foot of a bed
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
         self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + 3 * self.near
@@ -157,9 +155,7 @@ class Parts:
         self.backed: Mask = self.cased | on_body | right_behind[:, on_body].any(1)
         broad_frontways = ~self.slender | (self.upright & (self.side >= self.size[SIDE] / 2))
         large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
-        self.front: Mask = self.board & (self.depth == self.thin) & (broad_frontways | large)
-        highest = np.where(self.in_front, 0.2, 0.3) * self.size[UP]
-        self.plinth: Mask = self.front & self.grounded & (self.up <= highest) & (self.rear < 0)
+        self.front: Mask = self.facing & (broad_frontways | large)
 
 
 def turned(vectors: FloatArray, turns: int) -> FloatArray:

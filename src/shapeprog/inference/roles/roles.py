@@ -17,7 +17,7 @@ from itertools import cycle
 import numpy as np
 
 from shapeprog.geometry.scene import Scene
-from shapeprog.inference.candidates.drawings import simplest, solid_boxes
+from shapeprog.inference.candidates.drawings import redrawn_by, simplest, solid_boxes
 from shapeprog.inference.candidates.loops import mirrors
 from shapeprog.inference.roles.measures import Mask, Parts
 from shapeprog.language.parameters import to_float32
@@ -72,7 +72,7 @@ BED: tuple[Rule, ...] = (
     ("headboard", lambda p: p.head_or_foot & (p.rear > 0.25) & (p.top >= p.main_high[UP] + p.near)),
     ("footboard", lambda p: p.head_or_foot & (p.rear < -0.25)),
     ("mattress", lambda p: p.wide & ~p.below & (p.top <= p.main_high[UP] + 2 * p.near)),
-    ("pillow", lambda p: p.above & ~p.slender & (p.run <= 0.5)),
+    ("pillow", lambda p: (p.bottom >= p.main_high[UP] - 2 * p.near) & ~p.slender & (p.run <= 0.5)),
     ("side", lambda p: (p.aside > 0.3) & (p.run >= 0.5)),
     ("slat", lambda p: p.level & (p.equal >= 5)),
     *SUPPORTING,
@@ -84,7 +84,7 @@ BED: tuple[Rule, ...] = (
 
 CASE: tuple[Rule, ...] = (
     # In front: a plinth, doors and drawers with their handles.
-    ("base", lambda p: p.plinth),
+    ("base", lambda p: p.front & p.grounded & (p.rear < 0) & (p.up <= np.where(p.in_front, 0.2, 0.3) * p.size[UP])),
     ("handle", lambda p: p.tiny & p.in_front & p.backed & ~p.grounded & (p.long <= 0.3 * p.size.max())),
     ("door", lambda p: p.front & p.in_front & p.backed & ((p.up >= p.side) | (p.up > 0.5 * p.size[UP]))),
     ("drawer", lambda p: p.front & p.in_front & p.backed),
@@ -124,8 +124,7 @@ def with_roles(program: Program) -> Program:
 
     A box that is a leg is written as the statement ``leg``.
     """
-    named = map(_named, program.draws, roles_of_blocks(program))
-    return Program(tuple(nest((*loops, draw)) for (*loops, _), draw in zip(program.chains, named, strict=True)))
+    return redrawn_by(program, map(_named, program.draws, roles_of_blocks(program)))
 
 
 def separated(program: Program, most: int) -> Program:
@@ -169,8 +168,8 @@ def _shifted(draw: Node, shift: Sequence[float]) -> Node:
 def named_anew(program: Program) -> Program:
     """The program with each block drawn by the plainest statement, with a role by its neighbours, and in order;
     existing roles are ignored."""
-    bare = (nest((*loops, Draw(draw.name, draw.values))) for *loops, draw in program.chains)
-    return in_order(with_roles(simplest(Program(tuple(bare)))))
+    bare = redrawn_by(program, (Draw(draw.name, draw.values) for draw in program.draws))
+    return in_order(with_roles(simplest(bare)))
 
 
 def in_order(program: Program) -> Program:

@@ -317,7 +317,7 @@ def looking_of_all(barrier: np.ndarray, starts: np.ndarray, steps: np.ndarray, w
 def test_rays_find_the_way_out_as_their_twin_does(through):
     random = np.random.default_rng(1)
     barrier = random.random((12, 12, 12)) < 0.12
-    data = barrier, random.uniform(-1, 13, (300, 3)), seen.directions()[::2], 3
+    data = barrier, random.uniform(-1, 13, (300, 3)), seen.DIRECTIONS[::2], 3
     wanted = looking_of_all(*data, through=through)
     assert 50 < wanted.sum() < 290
     assert np.array_equal(seen.looking(*data, through=through), wanted)

@@ -29,6 +29,13 @@ AXES = ("up", "depth", "side")  # their names in programs
 
 Array = npt.NDArray[Any]
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+def cells_at(points: FloatArray, side: int) -> IntArray:
+    """The cells (P, 3) of points (P, 3), or the nearest, where the grid has so many along each side."""
+    return np.clip(((points + HALF) * (side / RESOLUTION)).astype(np.int64), 0, side - 1)
 
 
 def grid_axes(up: str, front: str) -> FloatArray:

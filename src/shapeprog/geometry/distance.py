@@ -68,7 +68,8 @@ def distance_and_slopes(batch: Batch, points: Float[Tensor, "B P 3"]) -> tuple[T
 
     Besides, the gradient of its sum by sizes, centres and rotations (B, N, 16) and by points (B, P, 3).
     """
-    return _with_slopes(table_of(batch), points)
+    values, rows, to_points = _with_slopes(table_of(batch), points)
+    return values, rows.reshape(*batch.mask.shape, WIDTH - SIZE), to_points
 
 
 def slopes_to_slots(
@@ -76,13 +77,13 @@ def slopes_to_slots(
 ) -> tuple[Float[Tensor, " P"], Float[Tensor, "P 16"], Float[Tensor, "P 3"]]:
     """Signed distances of points to the primitives in some slots of one scene, and gradients by each and by points."""
     values, rows, to_points = _with_slopes(table_of(scene)[array(slots)], points[:, None])
-    return values[:, 0], rows[:, 0], to_points[:, 0]
+    return values[:, 0], rows, to_points[:, 0]
 
 
 def _with_slopes(table: Array, points: Float[Tensor, "B P 3"]) -> tuple[Tensor, Tensor, Tensor]:
     slots, values = _nearest(table, points)
     to_table, to_points = _pulled(table, slots, points, torch.ones_like(values))
-    return values, torch.from_numpy(to_table).to(points).reshape(len(points), -1, WIDTH)[..., SIZE:], to_points
+    return values, torch.from_numpy(to_table).to(points)[:, SIZE:], to_points
 
 
 def _pulled(

@@ -8,13 +8,10 @@ ShapeNet is distributed with); the views meet the surface on a lattice of half c
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.errors import InputError
 from shapeprog.geometry.voxelise_kernels import first_hits, mark_hidden, mark_triangles
-from shapeprog.space import HALF, RESOLUTION, Array
-
-BoolArray = npt.NDArray[np.bool_]
+from shapeprog.space import HALF, RESOLUTION, Array, BoolArray
 
 SHRINK = 1 / 256
 """How far, in cells, a surface must reach into a cell to touch it: a face on a boundary touches neither side."""

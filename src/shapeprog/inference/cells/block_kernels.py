@@ -27,7 +27,7 @@ import numpy.typing as npt
 from shapeprog.kernels.bits import ones, span
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.rows import REACH
-from shapeprog.space import FloatArray
+from shapeprog.space import BoolArray, FloatArray
 
 WIDTH = 16  # numbers of one block
 
@@ -59,7 +59,7 @@ def draw_all(blocks: FloatArray) -> Words:
     return np.asarray(np.bitwise_or.reduce(draw_each(blocks)))
 
 
-def cells_of(words: Words) -> npt.NDArray[np.bool_]:
+def cells_of(words: Words) -> BoolArray:
     """Cells (32, 32, 32) from words (512)."""
     return np.unpackbits(words.view(np.uint8), bitorder="little").view(np.bool_).reshape(32, 32, 32)
 
@@ -164,8 +164,7 @@ def moves(block, out):
                         n = put(out, n, block, step, delta, corner, -np.rint(delta * (block[level] - 1) / 2))
                 n = put(out, n, block, level, delta, level, 0.0)
                 n = put(out, n, block, level, delta, level, 0.0)  # the same at the other end
-                for axis in range(3):
-                    out[n - 1, FIRST + axis] -= delta * block[level + 1 + axis]
+                out[n - 1, FIRST:EXTENT] -= delta * block[level + 1 : level + 4]
     return n
 
 
@@ -176,9 +175,8 @@ def descend(block, occupied, covered, price):
     ``occupied`` are the cells of the solid, ``covered`` those of the other blocks, as words (512).
     """
     words, around = np.empty(WORDS, np.uint64), np.empty((MOST_MOVES, WIDTH))
-    best = -np.inf
     around[0] = block
-    number = 1  # the block alone first, its neighbours later
+    best, number = -np.inf, 1  # the block alone first, its neighbours later
     for step in range(61):
         best_index = -1
         for m in range(number):
@@ -186,15 +184,13 @@ def descend(block, occupied, covered, price):
                 continue
             words[:] = covered
             draw_block(words.view(np.uint32), around[m])
-            shared = 0
-            union = 0
+            shared, union = 0, 0
             for i in range(WORDS):
                 shared += ones(words[i] & occupied[i])
                 union += ones(words[i] | occupied[i])
             value = shared / union - price * statements(around[m])
             if value > best + GAIN:
-                best = value
-                best_index = m
+                best, best_index = value, m
         if best_index < 0:
             break
         block[:] = around[best_index]

@@ -13,10 +13,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.inference.cells.block_kernels import COUNT1, COUNT2, EXTENT, FIRST
 from shapeprog.kernels.compile import helper, kernel
+from shapeprog.space import IntArray
 
 MIRROR, PERIOD = 1, 2
 
@@ -25,7 +25,7 @@ SIDE = 32
 """Largest number of cells along a side of a volume; a limit of so many cells for the side of a box is no limit."""
 
 
-def families(size: Sequence[int], max_copies: int) -> npt.NDArray[np.int64]:
+def families(size: Sequence[int], max_copies: int) -> IntArray:
     """Rows (axis1, kind1, a1, b1, axis2, kind2, a2, b2) of ways to repeat a box in a volume of this size.
 
     Kind ``MIRROR`` pairs a box with its image in plane a (see ``mirrors``), ``PERIOD`` repeats it a times at distance
@@ -103,14 +103,6 @@ def positive_sum(values, start, count):
 
 
 @helper
-def add(total, values, start, count):
-    """Add a stretch of values to the first values of another array."""
-    first = np.uint64(start)
-    for k in range(count):
-        total[k] += values[first + np.uint64(k)]
-
-
-@helper
 def heaviest_box(volume, limit0, limit1, floor, box):
     """Largest sum over all boxes of a weight volume; the box (lo0, hi0, lo1, hi1, lo2, hi2), half-open, is written.
 
@@ -131,7 +123,7 @@ def heaviest_box(volume, limit0, limit1, floor, box):
             break
         slab[:] = 0
         for hi0 in range(lo0, min(size0, lo0 + limit0)):
-            add(slab, weights, hi0 * plane, plane)
+            slab += weights[hi0 * plane : (hi0 + 1) * plane]
             for j in range(size1 - 1, -1, -1):
                 positive[j] = positive[j + 1] + positive_sum(slab, j * size2, size2)
             for lo1 in range(size1):
@@ -139,17 +131,14 @@ def heaviest_box(volume, limit0, limit1, floor, box):
                     break
                 line[:] = 0
                 for hi1 in range(lo1, min(size1, lo1 + limit1)):
-                    add(line, slab, hi1 * size2, size2)
-                    if positive[hi1] == positive[hi1 + 1]:  # nothing positive here: no box ends here
+                    line += slab[hi1 * size2 : (hi1 + 1) * size2]
+                    # Where nothing is positive, no box ends.
+                    if positive[hi1] == positive[hi1 + 1] or positive[lo1] - positive[hi1 + 1] <= best - SLACK:
                         continue
-                    if positive[lo1] - positive[hi1 + 1] <= best - SLACK:
-                        continue
-                    current = np.float32(0)
-                    start = 0
+                    current, start = np.float32(0), 0
                     for k in range(size2):
                         if current <= 0:
-                            current = np.float32(0)
-                            start = k
+                            current, start = np.float32(0), k
                         current += line[k]
                         if current > best:
                             best = current
@@ -188,9 +177,9 @@ def search_family(weights, family, floor, block):
     for part, level in ((0, COUNT1), (4, COUNT2)):
         axis, kind, a, b = family[part], family[part + 1], family[part + 2], family[part + 3]
         block[level] = 1
-        if axis >= 0 and kind == PERIOD:
+        if kind == PERIOD:
             block[level], block[level + 1 + axis] = a, b
-        elif axis >= 0:
+        elif kind == MIRROR:
             left, right = mirrors(a)
             low = block[FIRST + axis]
             block[FIRST + axis] = left + 1 - low - block[EXTENT + axis]

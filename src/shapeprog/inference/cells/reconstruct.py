@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -27,6 +25,7 @@ from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.inference.surface.evidence import Evidence, points_of_cells
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
+from shapeprog.space import BoolArray
 
 REACH = 1.49  # largest change of a parameter from a whole number, in cells: rounding and one step lead back
 
@@ -72,7 +71,7 @@ def reconstruct(
     return program, snapped, f"The search ended after {stopped}{advice}."
 
 
-def description_length(program: Program, voxels: npt.NDArray[np.bool_], snapped: Program | None = None) -> float:
+def description_length(program: Program, voxels: BoolArray, snapped: Program | None = None) -> float:
     """Description length of cells (32, 32, 32) by a program: 1 - IoU, plus the price of its text."""
     return 1 - float(iou(occupied(program, unroll(program), snapped), pack(voxels))) + Prices().of(program)
 
@@ -106,6 +105,5 @@ def refined(program: Program, target: Float[Tensor, "P 3"], *, seed: int = 0, de
             mean.lerp_(slope, 1 - 0.8)
             square.lerp_(slope**2, 1 - 0.95)
             pace = RATE * (0.55 + 0.45 * math.cos(math.pi * step / STEPS)) / (1 - 0.8 ** (step + 1))
-            values = values - pace * mean / ((square / (1 - 0.95 ** (step + 1))).sqrt() + 1e-8)
-            values = torch.minimum(torch.maximum(values, low), high)
+            values = (values - pace * mean / ((square / (1 - 0.95 ** (step + 1))).sqrt() + 1e-8)).clamp(low, high)
     return tunable.settled(values)

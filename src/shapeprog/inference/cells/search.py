@@ -9,37 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.cells.block_kernels import (
-    BACK,
-    DISC,
-    EXTENT,
-    FIRST,
-    FORM,
-    GAIN,
-    RADIUS,
-    TILT,
-    WIDTH,
-    Words,
-    cells_of,
-    descend,
-    draw_all,
-    draw_each,
-    statements,
-)
+from shapeprog.inference.cells import block_kernels as kernels
+from shapeprog.inference.cells.block_kernels import BACK, DISC, EXTENT, FIRST, FORM, GAIN, RADIUS, TILT, WIDTH, Words
 from shapeprog.inference.cells.blocks import to_program
 from shapeprog.inference.cells.proposal_kernels import families, propose
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.language.program import Program
-from shapeprog.space import HALF, Array, FloatArray
+from shapeprog.space import HALF, Array, BoolArray, FloatArray
 
 
 class Target:
     """Target and objective of a search."""
 
-    def __init__(self, voxels: npt.NDArray[np.bool_], settings: Settings) -> None:
+    def __init__(self, voxels: BoolArray, settings: Settings) -> None:
         self.settings = settings
         self.cells: Words = np.packbits(voxels, bitorder="little").view(np.uint64)  # the solid as words (512)
         occupied = np.argwhere(voxels)
@@ -52,7 +36,7 @@ class Target:
 
 
 def search_structure(
-    voxels: npt.NDArray[np.bool_],
+    voxels: BoolArray,
     settings: Settings,
     *,
     seed: int = 0,
@@ -85,7 +69,7 @@ def search_structure(
     return best, f"all {settings.rounds} rounds"
 
 
-def greedy_boxes(voxels: npt.NDArray[np.bool_], boxes: int = 10) -> Program:
+def greedy_boxes(voxels: BoolArray, boxes: int = 10) -> Program:
     """At most ``boxes`` boxes, each with the largest count of newly covered occupied minus empty cells.
 
     No learning, no loops, no search beyond the exact maximum-sum box: a baseline for programs of equal size.
@@ -125,7 +109,7 @@ def rebuilt(blocks: FloatArray, target: Target, random: np.random.Generator) -> 
 def extended(blocks: FloatArray, count: int, proposed: Callable[[Words], tuple[float, FloatArray]]) -> FloatArray:
     """Blocks and up to ``count`` more, each proposed for the cells that are covered so far, while these gain."""
     for _ in range(count):
-        gain, block = proposed(draw_all(blocks))
+        gain, block = proposed(kernels.draw_all(blocks))
         if gain <= 0:
             break
         blocks = np.concatenate([blocks, block[None]])
@@ -134,15 +118,15 @@ def extended(blocks: FloatArray, count: int, proposed: Callable[[Words], tuple[f
 
 def value_of(blocks: FloatArray, target: Target) -> float:
     """IoU minus price x statements."""
-    cells = draw_all(blocks)
+    cells = kernels.draw_all(blocks)
     shared, union = (np.bitwise_count(words).sum() for words in (cells & target.cells, cells | target.cells))
-    return float(shared / union - target.settings.price * statements(blocks.T).sum())
+    return float(shared / union - target.settings.price * kernels.statements(blocks.T).sum())
 
 
 def improved(block: FloatArray, covered: Words, target: Target) -> FloatArray:
     """A block after descent on the value, with the other blocks fixed, which cover so many cells."""
     better = block.copy()
-    descend(better, target.cells, covered, target.settings.price)
+    kernels.descend(better, target.cells, covered, target.settings.price)
     return better
 
 
@@ -151,7 +135,7 @@ def polish(blocks: FloatArray, target: Target) -> FloatArray:
     blocks, settled = blocks.copy(), np.zeros(len(blocks), np.bool_)
     for k in [*range(len(blocks))] * 3:
         if not settled[k]:
-            better = improved(blocks[k], draw_all(np.delete(blocks, k, 0)), target)
+            better = improved(blocks[k], kernels.draw_all(np.delete(blocks, k, 0)), target)
             settled &= np.array_equal(better, blocks[k])
             blocks[k], settled[k] = better, True
     value = value_of(blocks, target)
@@ -167,7 +151,7 @@ def best_box(covered: Words, waste: float, table: Array, target: Target) -> tupl
 
     An empty cell weighs ``waste``, an occupied one 1.
     """
-    block, done = np.zeros(WIDTH), cells_of(covered)[target.box]
+    block, done = np.zeros(WIDTH), kernels.cells_of(covered)[target.box]
     weights = np.where(done, 0, np.where(target.inside, 1, -waste)).astype(np.float32)
     gain = propose(weights, table, target.statement, block)
     block[FIRST:EXTENT] += target.low
@@ -182,9 +166,9 @@ def best_form(covered: Words, waste: float, box: FloatArray, target: Target) -> 
 
     def gains(blocks: FloatArray) -> FloatArray:
         """Gain in cells of each block (P,)."""
-        new = draw_each(blocks) & ~covered
+        new = kernels.draw_each(blocks) & ~covered
         shared, wasted = (np.bitwise_count(words).sum(1) for words in (new & target.cells, new & ~target.cells))
-        return np.asarray(shared - waste * wasted - target.statement * statements(blocks.T))
+        return np.asarray(shared - waste * wasted - target.statement * kernels.statements(blocks.T))
 
     forms, across = np.repeat(box[None], 11, 0), box[EXTENT + 1 : EXTENT + 3]
     forms[0, FORM], forms[0, RADIUS], forms[0, RADIUS + 1] = DISC, max(1, np.rint(across.sum() / 4)), 0

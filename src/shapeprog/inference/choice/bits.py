@@ -11,7 +11,7 @@ import numpy.typing as npt
 from shapeprog.geometry.arrays import over_threads, table_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.inference.choice.coverage_kernels import CELLS, cover
-from shapeprog.space import HALF, RESOLUTION, FloatArray
+from shapeprog.space import BoolArray, FloatArray, IntArray, cells_at
 
 WORD = 64  # bits of a word
 
@@ -24,8 +24,8 @@ class BinnedPoints(NamedTuple):
 
     points: FloatArray
     normals: FloatArray
-    order: npt.NDArray[np.int64]
-    starts: npt.NDArray[np.int64]
+    order: IntArray
+    starts: IntArray
 
 
 def by_word(values: FloatArray) -> FloatArray:
@@ -34,7 +34,7 @@ def by_word(values: FloatArray) -> FloatArray:
     return np.add.reduceat(values, starts) / np.diff(starts, append=len(values))
 
 
-def pack(flags: npt.NDArray[np.bool_]) -> Bits:
+def pack(flags: BoolArray) -> Bits:
     """Flags (B, N) as rows of words, the first of each in its lowest bit."""
     padded = np.pad(flags, ((0, 0), (0, -flags.shape[1] % WORD)))
     return np.packbits(padded, axis=1, bitorder="little").view(np.uint64)
@@ -51,23 +51,18 @@ def covers(scene: Batch, binned: BinnedPoints, tolerance: float, agreement: floa
     return explained, interior
 
 
-def nearby(points: FloatArray) -> npt.NDArray[np.int64]:
+def nearby(points: FloatArray) -> IntArray:
     """Morton codes (P,) of the cells of points: nearby points mostly have close codes (Morton 1966).
 
     In this order, the points of a word are neighbours, so a small candidate has bits in few words.
     """
-    index, bits = _cells(points, 64), range(6)
+    index, bits = cells_at(points, 64), range(6)
     return np.sum([((index[:, axis] >> bit) & 1) << (3 * bit + axis) for bit in bits for axis in range(3)], axis=0)
 
 
 def sorted_by_cell(points: FloatArray, normals: FloatArray | None = None) -> BinnedPoints:
     """Points and normals (P, 3), zero if unknown, in the order of the cells of a grid."""
-    key = _cells(points, CELLS) @ [CELLS**2, CELLS, 1]
+    key = cells_at(points, CELLS) @ [CELLS**2, CELLS, 1]
     order = np.argsort(key, kind="stable")
     starts = np.concatenate([[0], np.bincount(key, minlength=CELLS**3).cumsum()])
     return BinnedPoints(points[order], (np.zeros_like(points) if normals is None else normals)[order], order, starts)
-
-
-def _cells(points: FloatArray, side: int) -> npt.NDArray[np.int64]:
-    """The cells (P, 3) of points (P, 3), or the nearest, in a grid of so many along each side."""
-    return np.clip(((points + HALF) * (side / RESOLUTION)).astype(np.int64), 0, side - 1)

@@ -6,6 +6,7 @@ them is narrowest, found by projecting onto the one and the other in turn.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,10 +16,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 from torch import Tensor
 
-from shapeprog.geometry.arrays import numbers
-from shapeprog.geometry.distance import projected, signed_distance
+from shapeprog.geometry.distance import projected, signed_distance, slopes_to_slots
+from shapeprog.geometry.mesh import part_meshes
 from shapeprog.geometry.primitive import SIZES
-from shapeprog.geometry.primitives import primitives
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses
@@ -60,9 +60,9 @@ def joining(pairs: Int[Tensor, "C 2"], gap: Float[Tensor, " C"], count: int, wid
 
 def moved(scene: Scene, joints: Joints) -> Joints:
     """The same joints after their parts have moved: the points deepest in both parts, or nearest to both."""
-    parts = scene[joints.pairs]
-    points = projected(parts, _placed(parts, joints.normalized), rounds=6)
-    return joints._replace(normalized=_inner(scene[joints.pairs[:, 0]], points))
+    first = scene[joints.pairs[:, 0]]
+    points = projected(scene[joints.pairs], _placed(first, joints.normalized), rounds=6)
+    return joints._replace(normalized=_inner(first, points))
 
 
 def needs(poses: Poses, joints: Joints) -> tuple[Float[Tensor, " R"], Float[Tensor, "R F"]]:
@@ -72,31 +72,24 @@ def needs(poses: Poses, joints: Joints) -> tuple[Float[Tensor, " R"], Float[Tens
     (first, second), standing = joints.pairs.unbind(1), scene[joints.standing]
     bearing = torch.cat([first, joints.standing])  # the primitives on which the points are: joints, then feet
     normalized = torch.cat([joints.normalized, _inner(standing, _lowest(standing))])
-    (parts, rows), (others, other_rows) = _rows_of(scene, bearing), _rows_of(scene, second)
+    rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)[bearing].requires_grad_()
+    size, centre, rotation = rows.split([SIZES, 3, 9], -1)
+    parts = replace(scene[bearing], size=size, centre=centre, rotation=rotation.unflatten(-1, (3, 3)))
     points = _placed(parts, normalized)
-    at_joints = points[: len(second)]
-    gap = signed_distance(others, at_joints[:, None])[:, 0]
+    at_joints, at_feet = points.split([len(first), len(standing)])
+    gap, by_other, by_joints = slopes_to_slots(scene, second, at_joints.detach())
     gap = gap + 0.02  # into the other part, by more than rounding takes away
-    height = points[len(second) :, 0] - joints.floor
-    by_rows, by_other = torch.autograd.grad(gap.sum() + height.sum(), [rows, other_rows])
+    upwards = torch.eye(3, dtype=points.dtype)[:1].expand(len(standing), 3)
+    (by_rows,) = torch.autograd.grad(points, rows, torch.cat([by_joints, upwards]))
     by_number = (by_rows[:, None] @ slopes[bearing])[:, 0]
     by_number[: len(second)] += (by_other[:, None] @ slopes[second])[:, 0]
     by_number[: len(second)][gap < 0] = 0.0  # on an axis the slope of a depth is no number
-    return torch.cat([gap.clamp(min=0), height]).detach(), by_number
-
-
-def _rows_of(scene: Scene, slots: Int[Tensor, " R"]) -> tuple[Scene, Float[Tensor, "R 16"]]:
-    """The primitives in some slots (R, 1), and the sizes, centres and rotations to differentiate them by."""
-    rows = torch.cat([scene.size, scene.centre, scene.rotation.flatten(-2)], -1)[slots].requires_grad_()
-    size, centre, rotation = rows[:, None].split([SIZES, 3, 9], -1)
-    parts = replace(scene[slots[:, None]], size=size, centre=centre, rotation=rotation.unflatten(-1, (3, 3)))
-    return parts, rows
+    return torch.cat([gap.clamp(min=0), at_feet[:, 0].detach() - joints.floor]), by_number
 
 
 def _placed(parts: Scene, normalized: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
-    """Points given in the boxes of the first of primitives (C, k), in units of the half extents."""
-    local = (parts.bounds[:, 0] * normalized)[..., None]
-    return parts.centre[:, 0] + (parts.rotation[:, 0] @ local)[..., 0]
+    """Points given in the boxes of primitives (C,), in units of the half extents."""
+    return parts.centre + (parts.rotation @ (parts.bounds * normalized)[..., None])[..., 0]
 
 
 def _inner(scene: Scene, points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
@@ -108,9 +101,6 @@ def _inner(scene: Scene, points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
 def _lowest(scene: Scene) -> Float[Tensor, "S 3"]:
     """The lowest points of primitives (S,)."""
     points = torch.zeros_like(scene.centre)
-    sizes, rotations, centres = map(numbers, (scene.size, scene.rotation, scene.centre))
-    for n, kind in enumerate(scene.kind.tolist()):
-        vertices, _ = primitives[kind].mesh(sizes[n])
-        placed = vertices @ rotations[n].T + centres[n]
-        points[n] = torch.from_numpy(placed[placed[:, 0] <= placed[:, 0].min() + 1e-6]).mean(0)
+    for n, vertices, _ in part_meshes(scene, math.inf):
+        points[n] = torch.from_numpy(vertices[vertices[:, 0] <= vertices[:, 0].min() + 1e-6]).mean(0)
     return points

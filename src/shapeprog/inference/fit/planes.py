@@ -19,11 +19,11 @@ from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
-from shapeprog.inference.surface.components import Components, IntArray
+from shapeprog.inference.surface.components import Components
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.surface.oriented import Boxes
 from shapeprog.language.program import Program
-from shapeprog.space import FloatArray
+from shapeprog.space import FloatArray, IntArray
 
 LEAN = CUBOID.sizes.index("lean")  # slot of the lean of a cuboid; one that leans has faces along no axis
 

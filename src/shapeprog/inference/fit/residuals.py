@@ -23,9 +23,8 @@ from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.choice.bits import nearby
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses
-from shapeprog.inference.surface.components import IntArray
 from shapeprog.inference.surface.evidence import Evidence
-from shapeprog.space import FloatArray
+from shapeprog.space import FloatArray, IntArray
 
 NEVER = 1e9  # penalty of a pair whose normals are known to face opposite ways
 
@@ -163,5 +162,4 @@ def _joint(points: FloatArray, normals: FloatArray) -> FloatArray:
 
 def _nearest(tree: cKDTree, points: FloatArray, normals: FloatArray) -> IntArray:
     """The nearest members (P, k) of a tree to points with normals."""
-    nearest: IntArray = tree.query(_joint(points, normals), FIT.partners)[1]
-    return nearest
+    return np.asarray(tree.query(_joint(points, normals), FIT.partners)[1])

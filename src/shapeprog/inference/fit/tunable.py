@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -52,10 +51,10 @@ class Tunable:
         self._code = code = encode(program, dtype=torch.float64)
         # Of every number (F) the index of its node in the order of the text, and its slot there.
         self.moving = [(n, slot) for n, node in enumerate(nodes) for slot in _moving(node)]
-        # The same program with the number of every value, from 1, in its place; 0 where it stays.
-        place = {key: float(f) for f, key in enumerate(self.moving, 1)}
-        numbered = _changed(program, lambda key, value: place.get(key, 0.0))
-        self._index: Int[Tensor, "K J slots"] = encode(numbered, dtype=torch.float64).parameters.long() - 1
+        # Of every value its place in the vector, or -1, from two programs that differ in the moving numbers alone.
+        places = torch.arange(1, len(self.moving) + 1)
+        bare, numbered = (encode(self.with_values(row), dtype=torch.float64).parameters for row in (0 * places, places))
+        self._index: Int[Tensor, "K J slots"] = (numbered - bare).long() - 1
         quantities = [language()[nodes[n].name].quantities[slot] for n, slot in self.moving]
         self.kinds: list[Kind] = [quantity.kind for quantity in quantities]
         self.values = torch.tensor([nodes[n].values[slot] for n, slot in self.moving], dtype=torch.float64)
@@ -86,8 +85,13 @@ class Tunable:
 
     def with_values(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers."""
-        table = {key: to_float32(value) for key, value in zip(self.moving, values.tolist(), strict=True)}
-        return _changed(self.program, lambda key, value: table.get(key, value))
+        new = map(to_float32, values.tolist())
+
+        def changed(node: Node) -> Node:
+            moving = {*_moving(node)}
+            return replace(node, values=tuple(next(new) if k in moving else v for k, v in enumerate(node.values)))
+
+        return Program(changed_lines(self.program.body, changed))
 
     def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:
         """The numbers with as many decimals as their kind keeps."""
@@ -136,14 +140,3 @@ def _moving(node: Node) -> Iterator[int]:
         fixed = declared.is_loop and (node.values[slot] == 0 or even)
         if not quantity.discrete and not fixed:
             yield slot
-
-
-def _changed(program: Program, change: Callable[[tuple[int, int], float], float]) -> Program:
-    """The program with a change made to all numbers, given the index of the node and the slot of each."""
-    counter = count()
-
-    def changed(node: Node) -> Node:
-        n = next(counter)
-        return replace(node, values=tuple(change((n, slot), value) for slot, value in enumerate(node.values)))
-
-    return Program(changed_lines(program.body, changed))

@@ -7,9 +7,8 @@ import numpy.typing as npt
 
 from shapeprog.geometry.separation import OrientedBoxes, touching
 from shapeprog.inference.pieces.settings import SETTINGS
-from shapeprog.inference.surface.components import IntArray
 from shapeprog.inference.surface.oriented import Boxes, boxes_around
-from shapeprog.space import FloatArray
+from shapeprog.space import BoolArray, FloatArray, IntArray
 
 LINES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]])
 """Directions along which boxes are compared."""
@@ -45,7 +44,7 @@ def groups(boxes: Boxes) -> Boxes:
     return boxes_around(list(unique.values()))
 
 
-def _reachable(adjacent: npt.NDArray[np.float32], fits: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def _reachable(adjacent: npt.NDArray[np.float32], fits: BoolArray) -> BoolArray:
     """For each start (a row) the boxes reachable over adjacent boxes (N, N) that fit it (N, N)."""
     reached = np.eye(len(fits), dtype=np.bool_)
     while True:

@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
-from shapeprog.inference.surface.components import IntArray, linked
+from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.oriented import Boxes, boxes_around
-from shapeprog.space import FloatArray
+from shapeprog.space import FloatArray, IntArray
 
 
 def limbs(cloud: Cloud) -> Boxes:

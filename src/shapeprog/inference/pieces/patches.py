@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import find_objects
 from scipy.ndimage import label as label_regions
 
@@ -19,7 +18,7 @@ from shapeprog.inference.surface.cloud import Cloud
 from shapeprog.inference.surface.oriented import Boxes, boxes_around, join, principal_axes
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.hints import STRAIGHT
-from shapeprog.space import FloatArray
+from shapeprog.space import BoolArray, FloatArray
 
 
 def planar_patches(cloud: Cloud) -> Boxes:
@@ -66,7 +65,7 @@ def _bars(sets: list[FloatArray], patches: Boxes, side: float) -> Iterator[Boxes
         yield Boxes(centre, np.broadcast_to(axes, (len(ends), 3, 3)), half_bars)
 
 
-def _bars_of(grid: npt.NDArray[np.bool_]) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+def _bars_of(grid: BoolArray) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Rectangles of cells, low and high corners, formed by long runs along either axis of a grid."""
     corners = []
     for axis in range(2):

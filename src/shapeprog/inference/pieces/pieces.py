@@ -10,7 +10,6 @@ from itertools import compress, pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.geometry.mesh import triangle_normals
@@ -21,11 +20,11 @@ from shapeprog.inference.pieces.point_kernels import near_boxes
 from shapeprog.inference.pieces.rods import rods
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud, cloud_of, is_clean, projected
-from shapeprog.inference.surface.components import Components, IntArray
+from shapeprog.inference.surface.components import Components
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.surface.oriented import Boxes, boxes_around, join
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.space import UP, FloatArray
+from shapeprog.space import UP, BoolArray, FloatArray, IntArray
 
 
 class Source(IntEnum):
@@ -77,7 +76,7 @@ class Support:
         return np.array(selected, np.int64)
 
 
-def near(boxes: Boxes, points: FloatArray, distance: float) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+def near(boxes: Boxes, points: FloatArray, distance: float) -> tuple[BoolArray, FloatArray]:
     """Which points (N, 3) are near the surface of each box (B, N), and the share of it near which points lie (B,)."""
     rise = 1.001 * (np.abs(boxes.rotation[:, UP]) * (boxes.half + distance)).sum(1)
     order = np.argsort(points[:, UP])  # most points are above or below a box

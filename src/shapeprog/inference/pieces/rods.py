@@ -9,10 +9,9 @@ import numpy as np
 from shapeprog.inference.pieces.patches import upright
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
-from shapeprog.inference.surface.components import IntArray
 from shapeprog.inference.surface.oriented import Boxes, join
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.space import FloatArray
+from shapeprog.space import FloatArray, IntArray
 
 
 class Rod(NamedTuple):

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from shapeprog.data.shape import Shape
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import Array, FloatArray, IntArray
 
 
 class Cloud(NamedTuple):
@@ -68,7 +68,7 @@ def projected(points: FloatArray) -> FloatArray:
     return points
 
 
-def planes(points: FloatArray, neighbours: npt.NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def planes(points: FloatArray, neighbours: IntArray) -> tuple[FloatArray, FloatArray]:
     """Unit normals (N, 3) of the best planes through neighbours (N, k), and sums (N,) of squared distances."""
     off = points[neighbours]
     off -= off.mean(1, keepdims=True)

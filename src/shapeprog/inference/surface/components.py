@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from shapeprog.geometry.mesh import triangle_normals
-from shapeprog.space import Array, FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from shapeprog.space import Array, FloatArray, IntArray
 
 
 class Components(NamedTuple):

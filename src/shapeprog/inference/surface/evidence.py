@@ -18,15 +18,17 @@ from shapeprog.geometry.mesh import triangle_normals, union_mesh
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
-from shapeprog.inference.surface.components import Components, IntArray, components, enclosed, solid_sides
+from shapeprog.inference.surface.components import Components, components, enclosed, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
 from shapeprog.inference.surface.oriented import Boxes, boxes_around, join
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import HALF, RESOLUTION, SPAN, UP, FloatArray
+from shapeprog.space import HALF, RESOLUTION, SPAN, UP, BoolArray, FloatArray, IntArray, cells_at
 
-Flags = npt.NDArray[np.bool_]
+SPREAD = spiral(1 - (2 * np.arange(32) + 1) / 32)
+DIRECTIONS = SPREAD / np.abs(SPREAD).max(1, keepdims=True)
+"""Directions (32, 3) spread evenly over the sphere, the largest coordinate 1 or -1."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +38,15 @@ class Evidence:
     points: FloatArray  # points (P, 3) to be explained
     normals: FloatArray  # their unit normals (P, 3), zero where unknown
     weights: FloatArray  # their weights (P,), whose sum is 1
-    outward: Flags  # whether a normal is known to point outwards (P,); others are of either sign
+    outward: BoolArray  # whether a normal is known to point outwards (P,); others are of either sign
     tolerance: float  # distance within which a surface explains a point
     agreement: float  # least cosine between normals that agree
     surface: FloatArray  # more points (Q, 3) of the same surface: that of a program is supported by those near it
     surface_normals: FloatArray  # their unit normals (Q, 3), with which its own must agree
-    surface_outward: Flags  # whether a normal is known to point outwards (Q,), as it bounds a solid
+    surface_outward: BoolArray  # whether a normal is known to point outwards (Q,), as it bounds a solid
     reach: float  # distance within which one of these points supports a surface
     area: float  # of the surface that the points represent, in proportion to their weights, in square cells
-    free: Flags  # cells (R, R, R) of the grid that are known to be free; without meaning outside the box of the surface
+    free: BoolArray  # cells (R, R, R) of the grid known to be free; without meaning outside the box of the surface
     mesh: Components | None = None  # the components of the target, if it is a mesh
     # Boxes around its largest components, open ones included, and those (K) of closed components that fill most of
     # their box, with the share of it that each fills
@@ -67,19 +69,16 @@ def evidence_of(shape: Shape, seed: int = 0) -> Evidence:
 def off_parts(scene: Scene, evidence: Evidence) -> FloatArray:
     """How far the faces of the box around each primitive are at most from those of each part of a mesh (..., N, K), in
     cells; infinitely if only one leans, or the two do not fill the same share of their boxes."""
-    mask = scene.mask.numpy()
-    centre, rotation, half = (tensor.numpy()[mask] for tensor in (scene.centre, scene.rotation, scene.bounds))
-    fill = scene.volumes.numpy()[mask] / np.maximum((2 * half).prod(-1), 1e-9)
-    result = np.full((*mask.shape, len(evidence.part_fill)), np.inf)
-    off = np.full((len(half), len(evidence.part_fill)), np.inf)
+    centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
+    fill = scene.volumes.numpy() / np.maximum((2 * half).prod(-1), 1e-9)  # of padding 0, of parts of a mesh never
+    off = np.full((*fill.shape, len(evidence.part_fill)), np.inf)
     straight = Boxes(centre, rotation, half).straight
     for k, (share, along) in enumerate(zip(evidence.part_fill, evidence.parts.straight, strict=True)):
         # Seen along the axes of the grid, a board that leans by a degree would be as thick as its ends are apart.
         alike = (straight == along) & (np.abs(fill - share) <= (SURFACE.off_fill if along else SURFACE.off_box))
         away, reach = seen_along(rotation[alike], centre[alike], evidence.parts, k)
         off[alike, k] = (np.abs(away) + np.abs(reach - half[alike])).max(-1)
-    result[mask] = off
-    return result
+    return off
 
 
 def seen_along(
@@ -112,15 +111,13 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     fill = np.nan_to_num(np.abs(volume[: len(runs)]) / np.maximum((2 * boxes.half).prod(1), 1e-9))
     # Thin solids are no obstacle here; boxes hide what is inside of them and what touches them all the same.
     solid = boxes.take(np.flatnonzero(boxes.straight & (np.abs(fill - 1) < SURFACE.off_box))[: SURFACE.parts])
-    front, back = (
-        _visible(points, side, barrier) & ~_in_boxes(points + SURFACE.above * side, solid) for side in (facing, -facing)
-    )
+    front, back = (_visible(points, side, barrier, solid) for side in (facing, -facing))
     weights = np.where(front | back, 1.0, 0.1)  # what cannot be seen from outside counts little
     facing, oriented = _turned_outward(facing, front, back)
     seen = np.isin(np.arange(len(fill)), mesh.component_of(face[: SURFACE.points][front | back]))
     simple = np.flatnonzero(seen & (fill >= SURFACE.simple))[: SURFACE.parts]
     area = float(mesh.area.sum())
-    coarse: Flags = barrier.reshape((SURFACE.free, SURFACE.looking // SURFACE.free) * 3)
+    coarse: BoolArray = barrier.reshape((SURFACE.free, SURFACE.looking // SURFACE.free) * 3)
     for axis in range(1, 4):  # faster than all at once
         coarse = np.any(coarse, axis)
     return Evidence(
@@ -131,7 +128,7 @@ def _of_mesh(mesh: Components, seed: int) -> Evidence:
     )  # fmt: skip
 
 
-def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
+def _of_points(surface: FloatArray, voxels: BoolArray, seed: int) -> Evidence:
     """The evidence of a scan: normals are those of local planes; cells with clear rays in both directions are free."""
     distance, neighbours = cKDTree(surface).query(surface, k=SURFACE.planes)
     normals, squared = planes(surface, neighbours)
@@ -144,14 +141,15 @@ def _of_points(surface: FloatArray, voxels: Flags, seed: int) -> Evidence:
     selected = np.sort(np.random.default_rng(seed).permutation(len(surface))[: SURFACE.points])
     points, facing = surface[selected], normals[selected]
     above = 1.5 * RESOLUTION / SURFACE.free * facing
-    facing, oriented = _turned_outward(facing, _within(free, points + above), _within(free, points - above))
+    front, back = (free[tuple(cells_at(points + side, SURFACE.free).T)] for side in (above, -above))
+    facing, oriented = _turned_outward(facing, front, back)
     return Evidence(
         points, facing, np.full(len(points), 1 / len(points)), oriented, tolerance, SURFACE.scanned, surface, normals,
         np.zeros(len(surface), np.bool_), _reach(tolerance, area, len(surface)), area, free,
     )  # fmt: skip
 
 
-def _of_cells(voxels: Flags) -> Evidence:
+def _of_cells(voxels: BoolArray) -> Evidence:
     """The evidence of cells: one point for each exposed face, at the depth ``inset``.
 
     Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
@@ -168,7 +166,7 @@ def _of_cells(voxels: Flags) -> Evidence:
     )  # fmt: skip
 
 
-def points_of_cells(voxels: Flags, count: int = 5000) -> npt.NDArray[np.float32]:
+def points_of_cells(voxels: BoolArray, count: int = 5000) -> npt.NDArray[np.float32]:
     """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
 
     Uniform on the exposed faces of the cells, moved inwards by ``depth`` but for those at the ends of the longest side,
@@ -184,7 +182,7 @@ def points_of_cells(voxels: Flags, count: int = 5000) -> npt.NDArray[np.float32]
     return (np.clip(points, low + margin, high - margin) - HALF).astype(np.float32)
 
 
-def _exposed_faces(voxels: Flags) -> tuple[FloatArray, IntArray, Flags]:
+def _exposed_faces(voxels: BoolArray) -> tuple[FloatArray, IntArray, BoolArray]:
     """The normal (F, 3) of each exposed face of cells, its cell (F, 3), and whether it is at an end of a longest side
     (F,)."""
     padded, occupied = np.pad(voxels, 1), np.argwhere(voxels)
@@ -200,23 +198,17 @@ def _reach(tolerance: float, area: float, count: int) -> float:
     return max(1.5 * tolerance, math.sqrt(4 * area / (math.pi * count)))
 
 
-def _visible(points: FloatArray, normals: FloatArray, barrier: Flags) -> Flags:
-    """Whether points (P,) of a surface are visible from outside, on the side of their normals."""
-    scale = len(barrier) / RESOLUTION
+def _visible(points: FloatArray, normals: FloatArray, barrier: BoolArray, solid: Boxes) -> BoolArray:
+    """Whether points (P,) of a surface are visible from outside, on the side of their normals; none inside of boxes."""
     offset = normals / np.maximum(np.abs(normals).max(1, keepdims=True), 1e-9)
-    starts = (points + HALF) * scale + 1.5 * offset  # out of the cells that the surface itself touches
-    return looking(barrier, starts, directions(), 1, through=False)
+    starts = (points + HALF) * (len(barrier) / RESOLUTION) + 1.5 * offset  # out of the cells that the surface touches
+    visible, above = looking(barrier, starts, DIRECTIONS, 1, through=False), points + SURFACE.above * normals
+    for centre, rotation, half in zip(*solid, strict=True):
+        visible &= (np.abs((above - centre) @ rotation) >= half).any(1)
+    return visible
 
 
-def _in_boxes(points: FloatArray, boxes: Boxes) -> Flags:
-    """Whether points (P, 3) lie in one of some boxes."""
-    inside = np.zeros(len(points), np.bool_)
-    for centre, rotation, half in zip(*boxes, strict=True):
-        inside |= (np.abs((points - centre) @ rotation) < half).all(1)
-    return inside
-
-
-def _turned_outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[FloatArray, Flags]:
+def _turned_outward(normals: FloatArray, front: BoolArray, back: BoolArray) -> tuple[FloatArray, BoolArray]:
     """Normals (P, 3) turned outwards, and whether their orientation is known (P,).
 
     It is known where only the front or only the back of a point is free.  It is known everywhere, thin parts included,
@@ -229,36 +221,23 @@ def _turned_outward(normals: FloatArray, front: Flags, back: Flags) -> tuple[Flo
     return normals * np.where(oriented & back, -1.0, 1.0)[:, None], oriented
 
 
-def _within(cells: Flags, points: FloatArray) -> Flags:
-    """Whether points (P,) of the grid lie in cells that are set."""
-    index = np.floor((points + HALF) * (len(cells) / RESOLUTION)).astype(np.int64).clip(0, len(cells) - 1)
-    inside: Flags = cells[tuple(index.T)]
-    return inside
-
-
-def _free_cells(barrier: Flags, surface: FloatArray, *, through: bool) -> Flags:
+def _free_cells(barrier: BoolArray, surface: FloatArray, *, through: bool) -> BoolArray:
     """The cells (R, R, R) in the box around the surface from which enough directions lead out of the grid; with
     ``through``, both ways: parts of a shape may be missing from its scan."""
     scale = len(barrier) / RESOLUTION
     low, high = ((end + HALF) * scale for end in (surface.min(0), surface.max(0)))
     middle = np.arange(len(barrier))[:, None] + 0.5
-    steps, minimum = (directions()[::2], 4) if through else (directions(), 2)
+    steps, minimum = (DIRECTIONS[::2], 4) if through else (DIRECTIONS, 2)
     within, free = np.zeros_like(barrier), np.zeros_like(barrier)
     within[np.ix_(*((middle >= low) & (middle <= high)).T)] = True
     free[within] = looking(barrier, np.argwhere(within).astype(np.float64) + 0.5, steps, minimum, through=through)
     return free
 
 
-def directions() -> FloatArray:
-    """Directions (32, 3) spread evenly over the sphere, the largest coordinate 1 or -1."""
-    steps = spiral(1 - (2 * np.arange(32) + 1) / 32)
-    return steps / np.abs(steps).max(1, keepdims=True)
-
-
-def looking(barrier: Flags, starts: FloatArray, steps: FloatArray, minimum: int, *, through: bool) -> Flags:
+def looking(barrier: BoolArray, starts: FloatArray, steps: FloatArray, minimum: int, *, through: bool) -> BoolArray:
     """Whether at least ``minimum`` directions lead out of the grid from each start (N,); see the kernel."""
-    result = np.zeros(len(starts), np.bool_)
-    data = barrier, np.ascontiguousarray(starts), np.ascontiguousarray(steps), minimum, through, result
+    ways, result = np.stack([steps, -steps] if through else [steps]), np.zeros(len(starts), np.bool_)
+    data = barrier, np.ascontiguousarray(starts), ways, minimum, result
     over_threads(partial(look_out, *data), len(starts), least=1024)
     return result
 

@@ -7,13 +7,11 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.inference.surface.cloud import spiral
-from shapeprog.inference.surface.components import IntArray
 from shapeprog.inference.surface.oriented_kernels import COMPACT, FLAT, ROD, turn_each
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import Array, BoolArray, FloatArray, IntArray
 
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # the corners (8, 3) of a box of half extents 1
 SPHERE = np.ascontiguousarray(spiral((np.arange(80) + 0.5) / 80)[:, [1, 2, 0]].T)
@@ -32,9 +30,9 @@ class Boxes(NamedTuple):
         return Boxes(self.centre[which], self.rotation[which], self.half[which])
 
     @property
-    def straight(self) -> npt.NDArray[np.bool_]:
+    def straight(self) -> BoolArray:
         """Which of them lie along the axes of the grid (N,)."""
-        return (np.abs(self.rotation).max(1) >= 1 - 1e-6).all(1)
+        return (np.abs(self.rotation).max(-2) >= 1 - 1e-6).all(-1)
 
     def corners(self) -> FloatArray:
         """Their corners (N, 8, 3)."""

@@ -72,9 +72,8 @@ def turned(points, frame, axis, floor):
     while abs(sine) > cosine:  # the same rectangle, turned by less
         cosine, sine = sine, -cosine
     result = frame.copy()
-    for row in range(3):
-        u, v = frame[row, first], frame[row, second]
-        result[row, first], result[row, second] = cosine * u + sine * v, cosine * v - sine * u
+    result[:, first] = cosine * frame[:, first] + sine * frame[:, second]
+    result[:, second] = cosine * frame[:, second] - sine * frame[:, first]
     return result
 
 

@@ -86,6 +86,11 @@ class Part:
     role: str = ""
     note: str = ""
 
+    @property
+    def word(self) -> str:
+        """The name of the part, its role or else its kind."""
+        return self.role or self.kind
+
 
 @dataclass(frozen=True)
 class Group:

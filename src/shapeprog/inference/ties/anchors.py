@@ -10,16 +10,11 @@ conditional modes (Besag 1986) from several starts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
-import torch
-from jaxtyping import Float
-from torch import Tensor
 
-from shapeprog.geometry.primitive import SIZES
-from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import OrientedBoxes, gaps, touching
+from shapeprog.inference.fit.tunable import STEP
 from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, Key, boxes_of
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
@@ -30,26 +25,23 @@ from shapeprog.space import Array, FloatArray
 class _AxisAnchors:
     """The anchors of the K elements of one axis, for a program with all faces measured from the low side.
 
-    It is given with the boxes of its primitives (N,) from the low corner of the whole, how these move with its numbers
-    (N, 3, P) and (N, 3, 3, P), and the slots of pairs of primitives that touch (C,), (C,).
+    It is given with the boxes of its primitives (N,) from the low corner of the whole, and the slots of pairs of
+    primitives that touch (C,), (C,).
     """
 
-    def __init__(
-        self, layout: Layout, axis: int, boxes: OrientedBoxes, slopes: OrientedBoxes, pairs: tuple[Array, Array]
-    ) -> None:
-        self.axis, self.extent, self.pairs = axis, layout.extents[axis], pairs
+    def __init__(self, layout: Layout, axis: int, boxes: OrientedBoxes, pairs: tuple[Array, Array]) -> None:
+        self.layout, self.axis, self.extent, self.pairs = layout, axis, layout.extents[axis], pairs
         aslant = np.any(np.sort(np.abs(boxes.edges))[..., 1] > 1e-6, axis=1)  # others separate along the axis alone
         self.leaning = np.flatnonzero(aslant[pairs[0]] | aslant[pairs[1]])
         self.elements = [element for element in layout.elements.values() if element.axis == axis]
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
-        self.thin = {element.line for element in self.elements if self._is_thickness(layout, element)}
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in self.elements]
         # Both ends of a rod, with the cost of different anchors, or, of mirror images, of those at the sides
         self.spans: list[tuple[int, int, float]] = []
         self.images: list[tuple[int, int, float]] = []
         for (line, key), end in index.items():
-            if key in ("end", "through") and (line, "start") in index:
+            if key in ("end", "through"):
                 self._add_span(index[line, "start"], end)
         symmetric = {start for start, _, _ in self.images}
         self.spans = [span for span in self.spans if span[0] not in symmetric]
@@ -57,25 +49,29 @@ class _AxisAnchors:
         self.costs = np.full((count, most), np.inf)
         # By which share of the growth of the whole low and high ends move.
         self.shifts = np.full((count, most, 2), np.nan)
-        by_ends = np.zeros((slopes.centre.shape[-1], 2 * count))  # how the numbers follow from the ends of the elements
+        # How the numbers (P,) follow from the size of the whole and from the ends of the elements (1 + 2 K).
+        moves = np.zeros((1 + 2 * count, len(layout.slots)))
+        moves[0, axis] = 1
         for k, (element, choices) in enumerate(zip(self.elements, self.choices, strict=True)):
             self.costs[k, : len(choices)] = [self._unary(element, anchors) for anchors in choices]
             self.shifts[k, : len(choices)] = [(anchors[0] / HIGH, anchors[-1] / HIGH) for anchors in choices]
             if element.kind == "interval":
-                by_ends[layout.index[element.line, AXES[axis].size], 2 * k : 2 * k + 2] = -1, 1
+                moves[2 * k + 1 : 2 * k + 3, layout.index[element.line, AXES[axis].size]] = -1, 1
             if element.key != "across":
-                by_ends[layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")], 2 * k] = 1
+                moves[2 * k + 1, layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")]] = 1
+        self.chosen_by = np.arange(count)  # both ends of a symmetric rod have mirrored anchors: those of its start
         for one, other, penalty in self.images:
-            self.costs[one, :2], self.costs[other, :2] = (0.0, penalty), 0.0
+            self.costs[one, :2], self.costs[other, :2], self.chosen_by[other] = (0.0, penalty), 0.0, one
         # What the boxes follow from (Q = 2 + 2 K): from one, which gives them at the start, from growth of the whole
         # while all coordinates stay, as mirror images move with its high side, and from moves of the ends of elements.
-        with_whole = OrientedBoxes(slopes.centre[..., axis] + np.eye(3)[axis] / 2, slopes.edges[..., axis])
-        self.boxes = OrientedBoxes(*(
-            np.concatenate([start[..., None], whole[..., None], slope @ by_ends], -1)
-            for start, whole, slope in zip(boxes, with_whole, slopes, strict=True)
-        ))  # fmt: skip
+        moved = (layout.values(layout.numbers + way * moves) for way in (-STEP, STEP))
+        back, forth = (boxes_of(layout.tunable.scenes(values)) for values in moved)
+        slopes = [np.moveaxis(after - before, 0, -1) / (2 * STEP) for before, after in zip(back, forth, strict=True)]
+        slopes[0][:, axis, 0] += 0.5  # of the centres, from the low corner: the middle of the whole stays in the grid
+        at_start = [part[..., None] for part in boxes]
+        self.boxes = OrientedBoxes(*(np.concatenate(parts, -1) for parts in zip(at_start, slopes, strict=True)))
         self.along = self.boxes.centre[:, axis].copy(), self.boxes.edges[:, :, axis].copy()
-        start = np.eye(2 * count + 2)[:, :1]
+        start = np.eye(2 + 2 * count, 1)
         self.ends, self.gaps = self._ends(start), [self._gaps(start, exact=exact) for exact in (False, True)]
         low, high = self.ends[..., 0]
         self.long = high - low >= TIES.spanning * self.extent
@@ -86,16 +82,16 @@ class _AxisAnchors:
             beyond = np.stack([reaches[0], high >= high.max() - TIES.below * self.extent])
         self.weights = TIES.side * (reaches | beyond)  # of faces that do not move
 
-    def _is_thickness(self, layout: Layout, element: Element) -> bool:
+    def _is_thickness(self, element: Element) -> bool:
         """Whether a part is a board across the axis: a person expects it to keep its thickness."""
-        if element.key or layout.lines[element.line].kind == "divide":
+        if element.key or self.layout.lines[element.line].kind == "divide":
             return False
-        box = [layout.elements[element.line, "", axis] for axis in range(3)]
+        box = [self.layout.elements[element.line, "", axis] for axis in range(3)]
         least, second, _ = sorted(each.high - each.low for each in box)
         return element.high - element.low <= least <= TIES.board * second
 
     def _choices(self, element: Element) -> Sequence[Anchors]:
-        off = max(TIES.off_middle * self.extent, TIES.within * (element.kind != "interval"))
+        off = max(TIES.reach * self.extent, TIES.within * (element.kind != "interval"))
         centred = abs(element.middle - self.extent / 2) < off and self.axis < 2
         if element.kind != "interval":
             if self.axis == 2 and element.key != "plane":
@@ -113,7 +109,7 @@ class _AxisAnchors:
         """Both ends of a rod; if they are at equal distances from the middle they stay so."""
         ends, wide = [self.elements[k].low for k in (start, end)], TIES.spanning * self.extent
         span = start, end, TIES.resized * max(0.0, 1 - abs(ends[0] - ends[1]) / wide)
-        if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * TIES.off_middle * self.extent:
+        if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * TIES.reach * self.extent:
             sides = (LOW, HIGH) if ends[0] < ends[1] else (HIGH, LOW)
             self.choices[start], self.choices[end] = ([(MIDDLE,), (side,)] for side in sides)
             self.images.append(span)
@@ -122,7 +118,7 @@ class _AxisAnchors:
 
     def _unary(self, element: Element, anchors: Anchors) -> float:
         extent = self.extent
-        cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.off_middle * extent
+        cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.reach * extent
         ends = (element.low, element.high) if len(anchors) > 1 else (element.middle,)
         for end, anchor in zip(ends, anchors, strict=True):
             if anchor == MIDDLE:
@@ -138,7 +134,7 @@ class _AxisAnchors:
                 cost += TIES.from_top
         if len(set(anchors)) > 1:
             cost += TIES.resized * max(0.0, 1 - (element.high - element.low) / extent / TIES.spanning)
-            cost += TIES.thicker * (element.line in self.thin)
+            cost += TIES.thicker * self._is_thickness(element)
         return cost
 
     def solved(self) -> list[Anchors]:
@@ -152,40 +148,26 @@ class _AxisAnchors:
         # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
         if len(self.leaning) and self._costs(best[None], exact=True) >= TIES.separated:
             _, best = self._descent(best, exact=True)
-        best = self._with_images(best)
-        return [choices[k] for choices, k in zip(self.choices, best, strict=True)]
-
-    def _with_images(self, states: Array) -> Array:
-        """The states (..., K) in which both ends of a symmetric rod have mirrored anchors: those of its start."""
-        states = states.copy()
-        for start, end, _ in self.images:
-            states[..., end] = states[..., start]
-        return states
+        return [choices[k] for choices, k in zip(self.choices, best[self.chosen_by], strict=True)]
 
     def _descent(self, state: Array, *, exact: bool = False) -> tuple[float, Array]:
         """The cost and state (K,) from which no change of an element is cheaper."""
         total, (count, most) = float(self._costs(state[None], exact=exact)[0]), self.costs.shape
         for _ in range(8):
-            before, k = state, 0
-            while k < count:  # from here on the next element that is cheaper with another choice
-                ahead = min(TIES.ahead, count - k)
-                trials = np.tile(state, (ahead, most, 1))
-                trials[np.arange(ahead), :, np.arange(k, k + ahead)] = np.arange(most)
-                costs = self._costs(trials.reshape(-1, count), exact=exact).reshape(-1, most)
-                cheaper = costs.min(1) < total - 1e-9
-                if not cheaper.any():
-                    k += ahead
-                    continue
-                first = int(cheaper.argmax())
-                state, total = trials[first, costs[first].argmin()], float(costs[first].min())
-                k += first + 1
+            before = state
+            for k in range(count):
+                trials = np.tile(state, (most, 1))
+                trials[:, k] = np.arange(most)
+                costs = self._costs(trials, exact=exact)
+                if costs.min() < total - 1e-9:
+                    state, total = trials[costs.argmin()], float(costs.min())
             if state is before:
                 break
         return total, state
 
     def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K); for ``exact`` see :meth:`_gaps`."""
-        states, elements, growth = self._with_images(states), np.arange(states.shape[1]), TIES.growth * self.extent
+        states, elements, growth = states[:, self.chosen_by], np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for start, end, penalty in self.spans:
             cost += penalty * (shifts[:, start, 0] != shifts[:, end, 0])
@@ -221,26 +203,15 @@ class _AxisAnchors:
         return result
 
 
-def _slopes(scene: Scene, rows: Float[Tensor, "N 16 P"]) -> OrientedBoxes:
-    """How the boxes of primitives follow from numbers: their centres (N, 3, P) and edges (N, 3, 3, P)."""
-    steps = 1e-3 * torch.stack([rows, -rows]).permute(0, 3, 1, 2)  # forward and back (2, P, N, 16)
-    size, centre, rotation = steps.split([SIZES, 3, 9], -1)
-    rotation = scene.rotation + rotation.unflatten(-1, (3, 3))
-    boxes = boxes_of(replace(scene, size=scene.size + size, centre=scene.centre + centre, rotation=rotation))
-    return OrientedBoxes(*(np.moveaxis((after - before) / 2e-3, 0, -1) for after, before in boxes))
-
-
 def anchors_of(layout: Layout) -> dict[Key, Anchors]:
     """The anchors of all elements of a program, given with all faces measured from the low side."""
-    (scene, rows), (width, depth, _), scale = layout.poses(layout.numbers), layout.extents, layout.source.scale
-    assert scale is not None
-    boxes = boxes_of(scene)
+    (width, depth, _), scale = layout.extents, layout.scale
+    boxes = boxes_of(layout.scene(layout.numbers))
     pairs = touching(boxes, TIES.touch)
     boxes = boxes._replace(centre=boxes.centre - [-width / 2, scale.middle - depth / 2, scale.floor])
-    slopes = _slopes(scene, rows)
     result: dict[Key, Anchors] = {}
     for axis in range(3):
-        solver = _AxisAnchors(layout, axis, boxes, slopes, pairs)
+        solver = _AxisAnchors(layout, axis, boxes, pairs)
         for element, anchors in zip(solver.elements, solver.solved(), strict=True):
             result[element.line, element.key, axis] = anchors
         for last, first in solver.rows.items():

@@ -14,10 +14,9 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from shapeprog.geometry.separation import gaps, touching
+from shapeprog.inference.surface.components import linked
 from shapeprog.inference.ties.elements import Slot, boxes_of
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
@@ -90,10 +89,8 @@ def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[So
     one changes; and the values of these (Z,)."""
     contacts, free = _Contacts(layout, numbers), solution.free
     factors, values = solution.factors.copy(), numbers[free]
-    shared = [
-        z for z, k in enumerate(free)
-        if layout.slots[k].kind not in ("extent", "angle") and np.count_nonzero(factors[:, z]) > 1
-    ]  # fmt: skip
+    several = np.flatnonzero(np.count_nonzero(factors, axis=0) > 1).tolist()
+    shared = [z for z in several if layout.slots[free[z]].kind not in ("extent", "angle")]
     changes = contacts.after((factors * values).T[shared])
     for n, z in enumerate(shared):
         for _ in range(TIES.operations):
@@ -132,8 +129,8 @@ class _Contacts:
         self.layout, self.numbers = layout, numbers
         scene = layout.scene(numbers)
         self.line = np.array(layout.parts)[scene.block.numpy()]
-        self.first, self.second = touching(boxes_of(scene), TIES.touch)
-        self.pieces = self._pieces(np.ones((1, len(self.first)), bool))
+        self.pairs = np.stack(touching(boxes_of(scene), TIES.touch), 1)
+        self.pieces = self._pieces(np.ones((1, len(self.pairs)), bool))
 
     def after(self, parts: FloatArray) -> list[tuple[int, set[int]]]:
         """For parts (S, P) of the numbers, each of which a name multiplies: how many more pieces there are when that
@@ -144,17 +141,14 @@ class _Contacts:
         changed = self.layout.values(self.numbers + changes.reshape(-1, changes.shape[-1]))
         # One batch of all might have more primitives than ``unroll`` takes.
         scenes = map(self.layout.tunable.scenes, changed.split(TIES.changed))
-        kept = np.concatenate([gaps(boxes_of(scene), self.first, self.second) for scene in scenes]) < TIES.touch
+        kept = np.concatenate([gaps(boxes_of(scene), *self.pairs.T) for scene in scenes]) < TIES.touch
         more = (self._pieces(kept) - self.pieces).reshape(len(parts), -1).sum(1).tolist()
-        lines = self.line[np.stack([self.first, self.second])]
         lost = np.any(~kept.reshape(*changes.shape[:2], -1), 1)
-        return [(count, {*lines[:, of].ravel().tolist()}) for count, of in zip(more, lost, strict=True)]
+        lines = self.line[self.pairs]
+        return [(count, {*lines[of].ravel().tolist()}) for count, of in zip(more, lost, strict=True)]
 
     def _pieces(self, kept: Array) -> Array:
         """The numbers (S,) of pieces that contacts (S, C) leave."""
         count, (scene, pair) = len(self.line), np.nonzero(kept)
-        pairs = [count * scene + slots[pair] for slots in (self.first, self.second)]
-        graph = coo_array((np.ones(len(pair)), pairs), (count * len(kept),) * 2)
-        _, labels = connected_components(graph, directed=False)
-        first = np.unique(labels, return_index=True)[1]  # the first part of every piece, which tells its scene
-        return np.bincount(first // count, minlength=len(kept))
+        labels = linked(count * scene[:, None] + self.pairs[pair], count * len(kept)).reshape(len(kept), count)
+        return np.ptp(labels, axis=1) + 1  # those of one scene are numbered after those of another

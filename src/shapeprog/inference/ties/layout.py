@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Elemen
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
 from shapeprog.language.evaluate import expanded, symbolic
-from shapeprog.language.expression import Binary, Name, Value
+from shapeprog.language.expression import Name, Value
 from shapeprog.language.placement import AXES, BOX, POINTS, ROUND, SIZES, axis_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
@@ -59,22 +59,18 @@ class Layout:
                 case Part() | Group():
                     drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
-        # The parts and loops, in the order of the text, and their roles, or else kinds.  A division has the role of its
-        # part, for which it stands.
+        # The parts and loops, in the order of the text, and the words of parts by the number of their line.  A division
+        # stands for its part.
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
-        self.words = [line.kind for line in self.lines]
-        self.parts: list[int] = []  # the numbers of the lines that are parts
-        for index, line in enumerate(self.lines):
-            if isinstance(line, Part):
-                self.parts.append(index - self._divided(index))
-                self.words[index] = self.words[self.parts[-1]] = line.role or line.kind
+        parts = [(index, line) for index, line in enumerate(self.lines) if isinstance(line, Part)]
+        self.words = {index - self._divided(index): line.word for index, line in parts}
+        self.parts = [*self.words]
         last = [index + sum(1 for _ in Source((line,)).walk()) - 1 for index, line in enumerate(self.lines)]
         self.loops_around = [[loop for loop in range(n) if n <= last[loop]] for n in range(len(self.lines))]
         # Cylinders that fill the whole, to which ``_with_radius`` gave no radius: the whole then has one diameter.
         self._filling = [
-            index for index, line in enumerate(self.lines)
-            if line.kind == "cylinder" and "radius" not in dict(line.keywords)
-        ]  # fmt: skip
+            index for index, line in parts if line.kind == "cylinder" and "radius" not in dict(line.keywords)
+        ]
         if self._filling:
             self._sizes["depth"] = self._sizes["width"]
         self.extents = tuple(float(self._sizes[size]) for size in SIZES)
@@ -92,13 +88,13 @@ class Layout:
         self._numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
         self.numbers: FloatArray = np.array([slot.value for slot in self.slots])  # at the start (P,)
         self.source = Source((Assignment(tuple(self._numbers.items())), *self.body), source.unit, source.scale)
-        self.tunable, scale = Tunable(Program(expanded(self.source))), source.scale
-        assert scale is not None
+        self.tunable = Tunable(Program(expanded(self.source)))
+        assert source.scale is not None
+        self.scale = scale = source.scale
         floor = scale.floor + (self.extents[2] - self._forms["height"]) * 0.5  # the middle of the whole stays
         nodes = list(Program(symbolic(self.source, self._forms, (floor, scale.middle))).walk())
-        values = np.zeros((len(self.tunable.moving), len(self.slots) + 1))
-        for value, (n, slot) in zip(values, self.tunable.moving, strict=True):
-            value += nodes[n].values[slot]
+        none = np.zeros(len(self.slots) + 1)
+        values = np.array([none + nodes[n].values[slot] for n, slot in self.tunable.moving]).reshape(-1, len(none))
         # How the numbers of its statements in cells follow from those of the text (F, P), up to constants, and lower
         # bounds (F,) of the products of both: no part may become thinner than ``THINNEST``.
         self.jacobian: FloatArray = values[:, :-1] - values[:, -1:]
@@ -186,36 +182,32 @@ class Layout:
         off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
         left_out = {*SIZES[:2], "radius"}
         keywords: Keywords = (("radius", dict(line.keywords).get("radius", size / 2)),)
-        if line.kind == "cylinder" and size > TIES.fills * width and off < TIES.off_middle * width:
+        if line.kind == "cylinder" and size > TIES.fills * width and off < TIES.reach * width:
             left_out, keywords = {*AXES[0], *AXES[1], "radius"}, (("width", size), ("depth", size))
         return replace(line, keywords=(*(pair for pair in line.keywords if pair[0] not in left_out), *keywords))
 
-    def _ends(self, index: int, key: str, axis: int) -> tuple[float, float] | None:
-        """The ends of an element of a line; ``None`` if a point is not given along this axis."""
+    def _elements(self, index: int, key: str, axes: Iterable[int] = range(3)) -> Iterator[Element]:
+        """The elements of a line along axes; none where a point is not given."""
         line = self.lines[index]
         keywords = dict(line.keywords)
-        if key == "last":
-            assert isinstance(line, Group)
-            if not (step := keywords.get("xyz"[axis])):
-                return None
-            first, inner = self.first(index)
-            away = max(1, round(float(line.count)) - 1) * float(step)  # type: ignore[arg-type]
-            low, high = ends_of(self.lines[first], inner, axis, self._sizes)
-            return low + away, high + away
-        if key in ("plane", "centre") and keywords.keys().isdisjoint(AXES[axis]):
-            return None
-        ends = ends_of(line, key, axis, self._sizes)
-        if key in ("through", "end") and abs(ends[0] - ends_of(line, "start", axis, self._sizes)[0]) <= ALIGNED:
-            return None
-        return ends
-
-    def _element(self, index: int, key: str, axis: int, ends: tuple[float, float]) -> Element:
-        kind: ElementKind = "interval" if key in ("", "across") else "coordinate"
-        if kind == "interval" and axis < 2 and "radius" in dict(self.lines[index].keywords):
-            kind = "round"
-        anchors = self._anchors.get((index, key, axis), (LOW, LOW) if kind == "interval" else (LOW,))
-        self.elements[index, key, axis] = element = Element(index, key, axis, kind, *ends, anchors)
-        return element
+        for axis in axes:
+            low, high = ends_of(line, key, axis, self._sizes)
+            given = key not in ("plane", "centre") or not keywords.keys().isdisjoint(AXES[axis])
+            if key == "last":
+                assert isinstance(line, Group)
+                away = max(1, round(float(line.count)) - 1) * float(keywords.get("xyz"[axis], 0.0))  # type: ignore[arg-type]
+                first, inner = self.first(index)
+                low, high = (end + away for end in ends_of(self.lines[first], inner, axis, self._sizes))
+                given = away != 0
+            elif key in ("through", "end"):
+                given = abs(low - ends_of(line, "start", axis, self._sizes)[0]) > ALIGNED
+            if given:
+                kind: ElementKind = "interval" if key in ("", "across") else "coordinate"
+                if kind == "interval" and axis < 2 and "radius" in keywords:
+                    kind = "round"
+                anchors = self._anchors.get((index, key, axis), (LOW, LOW) if kind == "interval" else (LOW,))
+                self.elements[index, key, axis] = Element(index, key, axis, kind, low, high, anchors)
+                yield self.elements[index, key, axis]
 
     def _with_names(self, line: Line) -> Line:
         """A line with a name for every number, measured from the anchors; lines are given in the order of the text."""
@@ -238,25 +230,19 @@ class Layout:
             yield from ((word, self._point(index, word)) for word in POINTS if word in given)
             yield from ((word, self._across(index, axis)) for axis, word in enumerate(SIZES) if word in given)
         elif not self._divided(index):
-            for axis in range(3):
-                yield from self._along(index, axis)
-
-    def _along(self, index: int, axis: int) -> Iterator[tuple[str, Argument]]:
-        """The keywords of a part in a box along an axis: clearances, size and offset, by its anchors."""
-        element = self._element(index, "", axis, ends_of(self.lines[index], "", axis, self._sizes))
-        for anchor in sorted({*element.anchors}):
-            yield self._distance(element, anchor)
-        if element.kind == "interval" and len({*element.anchors}) == 1:
-            yield SIZES[axis], self._slot(index, SIZES[axis], "size", axis, element.high - element.low)
+            for element in self._elements(index, ""):
+                for anchor in sorted({*element.anchors}):
+                    yield self._distance(element, anchor)
+                if element.kind == "interval" and len({*element.anchors}) == 1:
+                    word = SIZES[element.axis]
+                    yield word, self._slot(index, word, "size", element.axis, element.high - element.low)
 
     def _point(self, index: int, key: str) -> Point:
         pairs: list[tuple[str, Value]] = []
-        for axis, words in enumerate(AXES):
-            if ends := self._ends(index, key, axis):
-                element = self._element(index, key, axis, ends)
-                (anchor,), off = element.anchors, element.middle - self.extents[axis] / 2
-                at_middle = key == "plane" and anchor == MIDDLE and abs(off) < ALIGNED
-                pairs.append((words.offset, 0.0) if at_middle else self._distance(element, anchor))
+        for element in self._elements(index, key):
+            (anchor,), off = element.anchors, element.middle - self.extents[element.axis] / 2
+            at_middle = key == "plane" and anchor == MIDDLE and abs(off) < ALIGNED
+            pairs.append((AXES[element.axis].offset, 0.0) if at_middle else self._distance(element, anchor))
         return Point(tuple(pairs))
 
     def _across(self, index: int, axis: int) -> Value:
@@ -265,11 +251,11 @@ class Layout:
         straight = abs(float(dict(bar.keywords).get("turn", 0))) <= TIES.degrees  # type: ignore[arg-type]
         off = max(abs(ends_of(bar, key, axis, self._sizes)[0] - extent / 2) for key in ("start", "end"))
         low, high = ends_of(bar, "across", axis, self._sizes)
-        if axis < 2 and straight and off < TIES.off_middle * extent:
-            element = self._element(index, "across", axis, (low, high))
+        if axis < 2 and straight and off < TIES.reach * extent:
+            (element,) = self._elements(index, "across", (axis,))
             if element.anchors == (LOW, HIGH):
                 value = self._slot(index, AXES[axis].low, "clearance", axis, (extent - (high - low)) / 2)
-                return Binary("-", Name(SIZES[axis]), Binary("*", 2.0, value))
+                return Name(SIZES[axis]) - 2.0 * value
         return self._slot(index, SIZES[axis], "size", axis, high - low)
 
     def _distance(self, element: Element, anchor: int) -> tuple[str, Name]:

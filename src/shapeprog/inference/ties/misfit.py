@@ -39,9 +39,8 @@ class Misfit:
         scale = np.maximum(layout.tunable.scale.numpy() @ np.abs(layout.jacobian), 1e-3)
         self.reach: FloatArray = np.maximum(scale, 1.0)  # cells that the surface moves for one unit of every number
         prior = np.maximum([PRIOR.get(slot.kind, 1e-3) for slot in layout.slots], minimum)
-        angles = np.array([slot.kind == "angle" for slot in layout.slots])
+        self.prior: FloatArray = prior * np.where([slot.kind == "angle" for slot in layout.slots], scale**2, 1.0)
         self.together: FloatArray = np.full(len(joints.pairs), TIES.together)  # weights of the squared gaps (C,)
-        self.prior: FloatArray = np.where(angles, prior * scale**2, prior)
         # Faces on planes of a mesh: their squared distances, weighted by area, are quadratic in the numbers; half the
         # slope where all numbers are 0 (P,), and half the curvature (P, P).
         count = len(layout.slots)

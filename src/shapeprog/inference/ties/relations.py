@@ -12,7 +12,6 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Element, Slot
 from shapeprog.inference.ties.layout import Layout
@@ -27,7 +26,7 @@ class Relation(NamedTuple):
     """That factors times the numbers of a program sum to zero."""
 
     row: FloatArray  # the factors (P,)
-    trust: float  # price of the number that it saves, as a multiple of the usual one
+    trust: float = 1.0  # price of the number that it saves, as a multiple of the usual one
     meetings: frozenset[tuple[int, int, int]] = frozenset()  # lines whose parts then meet face to face, with the axis
     limit: float = TIES.within  # largest deviation, in cells or degrees, with which it is considered
 
@@ -49,15 +48,14 @@ class _Face:
 def relations(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]]) -> list[Relation]:
     """Distinct relations that nearly hold where the numbers are these (P,), each with its highest trust; ``touching``
     are the pairs of lines, the smaller first, whose parts touch."""
-    found = [*_of_faces(layout, numbers, touching), *_of_numbers(layout, numbers)]
-    rows = np.array([relation.row for relation in found]).reshape(-1, len(numbers))
-    largest, limits = np.abs(rows).max(1, initial=0), np.array([relation.limit for relation in found])
     best: dict[bytes, Relation] = {}
-    for k in np.flatnonzero((largest > 0) & (np.abs(rows @ numbers) <= limits * largest)).tolist():
-        row, relation = rows[k] / rows[k, rows[k].nonzero()[0][0]], found[k]
-        key = np.round(row, 6).tobytes()
-        known = best.get(key, relation)
-        best[key] = Relation(row, max(relation.trust, known.trust), relation.meetings | known.meetings)
+    for relation in (*_of_faces(layout, numbers, touching), *_of_numbers(layout, numbers)):
+        row, largest = relation.row, np.abs(relation.row).max()
+        if largest > 0 and abs(row @ numbers) <= relation.limit * largest:
+            row = row / row[row.nonzero()[0][0]]
+            key = np.round(row, 6).tobytes()
+            known = best.get(key, relation)
+            best[key] = Relation(row, max(relation.trust, known.trust), relation.meetings | known.meetings)
     return list(best.values())
 
 
@@ -91,7 +89,7 @@ def worthwhile(
     rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
     imposed, free, axes, edges = list[FloatArray](), np.linalg.inv(curvature), rows[:0], 0
     low = np.minimum(low, bounded @ numbers) - HOLDS
-    meeting = [(k, *pair) for k, relation in enumerate(candidates) for pair in relation.meetings]
+    meetings = [(k, where) for k, relation in enumerate(candidates) for where in relation.meetings]
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
     benefit = price * np.array([relation.trust for relation in candidates])
     # Below this share of its freedom a relation holds already: for numbers that nothing determines, rounding alone
@@ -106,7 +104,9 @@ def worthwhile(
         moved = numbers - along * off[best] / spread[best]
         across = rows @ along
         off_then, spread_then = off - across * off[best] / spread[best], spread - across**2 / spread[best]
-        edges_then = _edges(meeting, (spread_then <= minimum) & (np.abs(off_then) < HOLDS))
+        holds = (spread_then <= minimum) & (np.abs(off_then) < HOLDS)
+        met = {where for k, where in meetings if holds[k]}
+        edges_then = len(met) - len({where[:2] for where in met})  # axes beyond the first along which pairs meet
         worse = (bounded @ moved < low).any() or edges_then > edges
         new = beside(rows[best], axes)
         if new is None or (worse and benefit[best] < np.inf):
@@ -119,12 +119,6 @@ def worthwhile(
         spread[best] = 0.0
 
 
-def _edges(meetings: list[tuple[int, int, int, int]], holds: npt.NDArray[np.bool_]) -> int:
-    """Along how many axes beyond the first pairs of lines meet, by relations that hold."""
-    met = {(first, second, axis) for index, first, second, axis in meetings if holds[index]}
-    return len(met) - len({(first, second) for first, second, _ in met})
-
-
 def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
     """Zeros, equal lengths and angles, and equal clearances of a part along two axes."""
     slots, eye = layout.slots, np.eye(len(layout.slots))
@@ -134,19 +128,19 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
             if slot.word.endswith("bottom") and numbers[k] < floor:
                 yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
             else:
-                yield Relation(eye[k], TIES.equal)
+                yield Relation(eye[k])
         elif slot.kind == "gap" and abs(slot.value) <= TIES.touch:
-            yield Relation(eye[k], TIES.equal)
+            yield Relation(eye[k])
         elif slot.kind == "offset":
             limit = TIES.plane if slot.word.startswith("plane") else TIES.within
             yield Relation(eye[k], TIES.symmetric[slot.axis], limit=limit)
         elif slot.kind == "angle" and slot.word != "step":
-            yield Relation(eye[k], TIES.equal, limit=TIES.degrees)
+            yield Relation(eye[k], limit=TIES.degrees)
     for (a, slot), (b, other) in combinations(enumerate(slots), 2):
         limit = TIES.degrees if slot.kind == "angle" else TIES.within
         if slot.kind != other.kind or abs(numbers[a] - numbers[b]) > limit:
             continue
-        larger, equal = max(numbers[a], numbers[b]), Relation(eye[a] - eye[b], TIES.equal)
+        larger, equal = max(numbers[a], numbers[b]), Relation(eye[a] - eye[b])
         if slot.kind == "angle" and slot.word == other.word:
             yield equal._replace(limit=limit)
         elif slot.kind == "clearance":
@@ -209,7 +203,7 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
     touches = lines[0] != lines[1] and tuple(lines) in touching
     if face.anchor != other.anchor:
         if {face.anchor, other.anchor} == {LOW, HIGH} and single and axis < 2:
-            trust = TIES.symmetric[axis] if same else TIES.contact if "last" in keys else TIES.equal
+            trust = TIES.symmetric[axis] if same else TIES.contact if "last" in keys else 1.0
             yield Relation(image, trust)
     elif middles:
         if touches and axis < 2 and any(points) and not single:
@@ -223,11 +217,11 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
         if "last" in keys and touches and (face.single or other.single):
             yield Relation(row, TIES.contact)
         elif single:
-            yield Relation(row, TIES.equal)
+            yield Relation(row)
     else:
         meet = face.facing * other.facing == -1
         if touches and (face.facing != other.facing or all(points)):
             limit = TIES.within if meet or all(points) else TIES.end_within
             yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()), limit)
         elif face.facing == other.facing and (single or touches):
-            yield Relation(row, TIES.equal if single else TIES.equal / 2)
+            yield Relation(row, 1.0 if single else 0.5)

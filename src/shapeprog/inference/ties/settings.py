@@ -35,15 +35,14 @@ class TieSettings:
     repeats: int = 6  # most times at one price that parts are tied which come apart,
     heavier: float = 10.0  # each time with so many times the weight of their joints
 
-    # Price of the number that a relation saves, as a multiple of the usual price
+    # Price of the number that a relation saves, as a multiple of the usual price.  That is the price for zeros; equal
+    # sections, equal sizes of parts of one role, and equal clearances, of a part at a corner, of parts at one side or
+    # at opposite sides, or of a row along one axis.
     floor: float = 6.0  # a part that ends just above the floor
     # Equal clearances on the left and right, in front and at the rear, above and below
     symmetric: tuple[float, float, float] = (4.0, 2.0, 2.0)
     contact: float = 2.0  # faces that meet
     straight: float = 1.5  # ends of a rod at equal distances, or on the middle line of a part that it touches
-    # Zeros; equal sections, equal sizes of parts of one role, and equal clearances, of a part at a corner, of parts
-    # at one side or at opposite sides, or of a row along one axis
-    equal: float = 1.0
 
     # By how much a relation may be off
     within: float = 0.3  # lengths
@@ -67,21 +66,17 @@ class TieSettings:
     from_top: float = 0.25  # of a height measured from the top by a part that is not near it: people expect the floor
 
     # Shares of the whole
-    reach: float = 0.02  # up to this a face reaches a side, or a part the floor
+    reach: float = 0.02  # up to this a face reaches a side, a part the floor, or the middle of a part that of the whole
     beyond: float = 0.3  # parts wholly beyond this share of the half are near that side
     below: float = 0.1  # parts whose top is so far below that of the whole are near the top
     board: float = 0.4  # the thickness of a board is at most this share of its next longer side
     spanning: float = 0.6  # from this on parts are long
     growth: float = 0.25  # by which the whole grows to see what is separated
-    off_middle: float = 0.02  # by which the middle of a part may miss that of the whole
     fills: float = 0.9  # from this on a round part fills the whole
 
     # Numbers that carry parts
     changes: tuple[float, ...] = (0.7, 1.4)  # what a name is multiplied by to see which parts it separates
     operations: int = 2  # most numbers that are measured from one
-
-    # Batches
-    ahead: int = 16  # most elements whose anchors are tried at once
     changed: int = 64  # most changed programs that are drawn at once
 
     # Fit

@@ -65,10 +65,8 @@ def written(layout: Layout, solution: Solution, free: FloatArray, *, group: bool
     pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
     for are_sums in (False, True):
         header += _assignments([pair for pair in pairs if isinstance(pair[1], Expression) == are_sums])
-    scale = layout.source.scale
-    assert scale is not None
-    floor = scale.floor + (layout.extents[2] - float(known["height"])) * scale.cells_per_unit / 2
-    return Source((*header, *_changed(body, final)), layout.source.unit, replace(scale, floor=floor))
+    floor = layout.scale.floor + (layout.extents[2] - float(known["height"])) * layout.scale.cells_per_unit / 2
+    return Source((*header, *_changed(body, final)), layout.source.unit, replace(layout.scale, floor=floor))
 
 
 def _inlined(lines: tuple[Line, ...], shared: Mapping[str, Value]) -> tuple[tuple[Line, ...], dict[str, Value]]:
@@ -112,11 +110,6 @@ class Use(NamedTuple):
     part: Part
     point: str
     word: str
-
-    @property
-    def role(self) -> str:
-        """The role of the part, or else its kind."""
-        return self.part.role or self.part.kind
 
 
 def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str, float]) -> dict[str, str]:
@@ -169,21 +162,20 @@ def _candidates(uses: Sequence[Use], numbers: dict[str, float]) -> tuple[list[st
     quantities = {use: _quantity(use, numbers) for use in uses}
     selected = [use for use in uses if quantities[use] not in FURTHER] or uses
     kinds = Counter(quantities[use] for use in selected)
-    roles = Counter(use.role for use in selected)
     (kind, _), *others = kinds.most_common()
     if others and kind in FURTHER:
         kind = "inset" if kinds.keys() <= {"inset", "setback"} else "clearance"
     part, count = Counter(use.part for use in selected).most_common(1)[0]
     shared = []
     if kind in SIZES and count > 1:  # the section of a square part
-        shared = [f"{part.role or part.kind}_width"]
-    elif len(roles) > 1 and kind not in ("drop", "bottom", "offset"):
+        shared = [f"{part.word}_width"]
+    elif len({use.part.word for use in selected}) > 1 and kind not in ("drop", "bottom", "offset"):
         shared = ["board_width"] if kind in SIZES else [kind]
         shared += ["board_thickness"] if kind == "thickness" else []
     # The second point of a part is not where the part is: the upper end of a leg is no ``leg_bottom``.
     plain = [use for use in selected if use.point not in ("through", "end")]
-    own = [f"{role}_{kind}" for role, _ in Counter(use.role for use in plain).most_common()]
-    own += [f"{use.role}_{use.point}_{quantities[use]}" for use in selected if use.point]
+    own = [f"{role}_{kind}" for role, _ in Counter(use.part.word for use in plain).most_common()]
+    own += [f"{use.part.word}_{use.point}_{quantities[use]}" for use in selected if use.point]
     return shared, own
 
 
@@ -193,5 +185,5 @@ def _quantity(use: Use, numbers: dict[str, float]) -> str:
         return PLACES.get(use.word, use.word)
     lengths = {word: np.ptp(ends_of(use.part, "", axis, numbers)) for axis, word in enumerate(SIZES)}
     least, second, _ = sorted(lengths.values())
-    flat = use.word == "height" and use.role in FLAT
+    flat = use.word == "height" and use.part.word in FLAT
     return "thickness" if flat or lengths[use.word] <= least <= TIES.thin * second else use.word

@@ -147,16 +147,15 @@ class _Ties:
 
         Where ties separate lines from the others, the joints of these weigh more, and its numbers are tied again.
         """
-        slots = self.layout.slots
         self.misfit.together[:] = TIES.together
         for _ in range(TIES.repeats):
             solution, values = self._solved(price)
-            digits = (DEGREES if slots[k].kind == "angle" else self.decimals for k in solution.free)
+            kinds = [self.layout.slots[k].kind for k in solution.free]
+            digits = (DEGREES if kind == "angle" else self.decimals for kind in kinds)
             free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
-            zero = (np.abs(free) <= self.zero) & [slots[k].kind in DISTANCES for k in solution.free]
-            zero &= ~self.fixed[solution.free]
-            solution = Solution(solution.factors[:, ~zero], np.array(solution.free)[~zero].tolist())
-            free = free[~zero]
+            keep = (np.abs(free) > self.zero) | self.fixed[solution.free] | [kind not in DISTANCES for kind in kinds]
+            solution = Solution(solution.factors[:, keep], np.array(solution.free)[keep].tolist())
+            free = free[keep]
             loose = self._loose(solution.factors @ free)
             loose = loose and loose - self._loose(self.layout.numbers)  # those that were so before do not count
             if not loose:

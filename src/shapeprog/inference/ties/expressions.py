@@ -93,13 +93,11 @@ def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[So
     shared = [z for z in several if layout.slots[free[z]].kind not in ("extent", "angle")]
     changes = contacts.after((factors * values).T[shared])
     for n, z in enumerate(shared):
-        for _ in range(TIES.operations):
-            cost, lost = changes[n]
-            ways = [*product(_carriable(factors, free, layout, lost, z), (1.0, -1.0))] if cost else []
-            others = contacts.after(np.array([(factors[:, z] + way * factors[:, y]) * values[z] for y, way in ways]))
-            least, best = min(((more, index) for index, (more, _) in enumerate(others)), default=(cost, 0))
-            if least >= cost:
-                break
+        cost, lost = changes[n]
+        ways = [*product(_carriable(factors, free, layout, lost, z), (1.0, -1.0))] if cost else []
+        others = contacts.after(np.array([(factors[:, z] + way * factors[:, y]) * values[z] for y, way in ways]))
+        least, best = min(((more, index) for index, (more, _) in enumerate(others)), default=(cost, 0))
+        if least < cost:
             y, way = ways[best]
             factors[:, z] += way * factors[:, y]
             values[y] -= way * values[z]

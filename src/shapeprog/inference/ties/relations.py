@@ -221,7 +221,6 @@ def _pair(layout: Layout, face: _Face, other: _Face, touching: set[tuple[int, in
     else:
         meet = face.facing * other.facing == -1
         if touches and (face.facing != other.facing or all(points)):
-            limit = TIES.within if meet or all(points) else TIES.end_within
-            yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()), limit)
+            yield Relation(row, TIES.contact, frozenset([(lines[0], lines[1], axis)] if meet else ()))
         elif face.facing == other.facing and (single or touches):
             yield Relation(row, 1.0 if single else 0.5)

@@ -46,7 +46,6 @@ class TieSettings:
 
     # By how much a relation may be off
     within: float = 0.3  # lengths
-    end_within: float = 0.15  # the end of a rod, from a face that it touches
     plane: float = 0.1  # planes of mirrors off the middle
     degrees: float = 2.0  # angles; also of bars about themselves whose sides follow those of the whole
     alike: float = 0.25  # equal sizes, as a share of the larger
@@ -76,7 +75,6 @@ class TieSettings:
 
     # Numbers that carry parts
     changes: tuple[float, ...] = (0.7, 1.4)  # what a name is multiplied by to see which parts it separates
-    operations: int = 2  # most numbers that are measured from one
     changed: int = 64  # most changed programs that are drawn at once
 
     # Fit

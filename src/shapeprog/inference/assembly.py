@@ -9,7 +9,6 @@ Pieces become candidates by the hints of statements, not by their names.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
@@ -84,21 +83,15 @@ def _candidates(evidence: Evidence) -> list[Node]:
 def _chosen(
     candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
 ) -> tuple[list[Node], list[Node]]:
-    """A choice among a first one, one with a wide tolerance, their adjusted forms and neighbours, boxes around
-    unexplained points, and candidates passed over; and the others, those that would explain most of the rest first.
-    """
+    """A choice among a first one, its adjusted form and neighbours, boxes around unexplained points, and candidates
+    passed over; and the others, those that would explain most of the rest first."""
     evidence = coverage.evidence
     first, others = _choice(candidates, coverage, blocks, seed)
     if not first or deadline.passed("another choice among neighbours"):
         return first, others
-    wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
-    loose, _ = _choice(candidates, Coverage(wide, coverage.prices), blocks, seed)
-    pool = first.copy()
-    for nodes in [first, loose] if loose != first else [first]:
-        adjusted = adjust(Program(tuple(nodes)), evidence, steps=8, deadline=deadline)
-        pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
-    pool = list(dict.fromkeys([*pool, *others[:200]]))  # the first choice first: the search starts there
-    return _choice(pool, coverage, blocks, seed, range(len(first)))
+    adjusted = adjust(Program(tuple(first)), evidence, steps=8, deadline=deadline)
+    pool = [*first, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence), *others[:200]]
+    return _choice(list(dict.fromkeys(pool)), coverage, blocks, seed, range(len(first)))
 
 
 def _choice(

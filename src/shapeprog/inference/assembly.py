@@ -91,6 +91,7 @@ def _chosen(
         return first, others
     adjusted = adjust(Program(tuple(first)), evidence, steps=8, deadline=deadline)
     pool = [*first, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence), *others[:200]]
+    # The search starts at the first choice, whose blocks are the first of the pool.
     return _choice(list(dict.fromkeys(pool)), coverage, blocks, seed, range(len(first)))
 
 

@@ -21,6 +21,7 @@ from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.data.loading import load
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
+from shapeprog.formats.format import CELLS
 from shapeprog.formats.samples import occupied
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.cells import iou, pack
@@ -51,8 +52,6 @@ SURFACE_KERNELS = (
 )  # fmt: skip
 CELL_KERNELS = "geometry/cell", "inference/cells/"
 """Where the kernels of the search on the surface and of that on cells are; those with the same helpers together."""
-
-CELLS = "cells"  # the word for lengths in cells of the grid
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -41,17 +40,17 @@ def in_readable_unit(program: Program, unit: Unit | None) -> Program:
     exact = in_unit(program, unit)
     if not 0 < exact.size <= 256:  # rounding takes long for more primitives
         return exact
-    loose = _loose(program)
+    pieces = _pieces(program)
     for tolerance in TOLERANCES if unit is not None else IN_CELLS:
         result = _rounded(exact, tolerance)
-        if result is not None and _loose(result) <= loose:
+        if result is not None and _pieces(result) <= pieces:
             return result
     return exact
 
 
-def _loose(program: Program) -> int:
-    """How many parts are outside the largest connected solid."""
-    return int(np.count_nonzero(pieces_of_parts(unroll(program))))
+def _pieces(program: Program) -> int:
+    """The number of connected solids besides the largest."""
+    return int(pieces_of_parts(unroll(program)).max(initial=0))
 
 
 def _rounded(program: Program, tolerance: float) -> Program | None:

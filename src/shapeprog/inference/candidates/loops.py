@@ -154,8 +154,10 @@ def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
     for axis in range(3):
         across = np.arange(3) != axis
         limit = np.where(across, np.maximum(SETTINGS.off_size, half / 4), np.maximum(SETTINGS.off_size / 2, half / 2))
-        similar = (np.abs(half[:, None] - half) <= limit[:, None]).all(2)
-        similar &= (np.abs(centre[:, None] - centre)[..., across] <= SETTINGS.stray).all(2)
+        similar = (
+            (np.abs(half - own) <= limit[k]).all(1) & (np.abs(centre - centre[k])[:, across] <= SETTINGS.stray).all(1)
+            for k, own in enumerate(half)
+        )
         for group in dict.fromkeys(tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in similar):
             members = list(group)
             if len(members) < SETTINGS.least_row or len(set(owner[members])) < 2:

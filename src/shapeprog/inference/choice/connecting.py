@@ -28,29 +28,30 @@ def connected(program: Program, coverage: Coverage) -> Program:
 
     One block after another is changed or removed, each time to the most valuable program with fewer floating parts.
     """
-    count = sum(lone for _, lone in _parts(program))
-    if not count:
-        return program
-    every = [program, *_options(program)]
-    nodes = dict.fromkeys(node for option in every for node in option.body)
-    table, index = coverage.table([*nodes]), {node: number for number, node in enumerate(nodes)}
-    start, *values = (value(table, tuple(index[node] for node in option.body)) for option in every)
-    order = np.argsort(np.negative(values), kind="stable")[: SETTINGS.ways].tolist()
-    limits = [SETTINGS.floating if option.blocks == program.blocks else SETTINGS.removed for option in every[1:]]
-    likely = [every[1 + number] for number in order if values[number] >= start - limits[number]]
-    groups = contact_groups(unroll([program, *likely]))  # in less time than unions take
-    fewer = (option for option, number in zip(likely, groups[1:], strict=True) if number < groups[0] or groups[0] == 1)
-    better = next((option for option in fewer if sum(lone for _, lone in _parts(option)) < count), None)
-    return program if better is None else connected(better, coverage)
+    while count := sum(lone for _, lone in _loose_parts(program)):
+        every = [program, *_options(program)]
+        nodes = dict.fromkeys(node for option in every for node in option.body)
+        table, index = coverage.table([*nodes]), {node: number for number, node in enumerate(nodes)}
+        start, *values = (value(table, tuple(index[node] for node in option.body)) for option in every)
+        order = np.argsort(np.negative(values), kind="stable")[: SETTINGS.ways].tolist()
+        limits = [SETTINGS.floating if option.blocks == program.blocks else SETTINGS.removed for option in every[1:]]
+        likely = [every[1 + number] for number in order if values[number] >= start - limits[number]]
+        before, *groups = contact_groups(unroll([program, *likely]))  # in less time than unions take
+        fewer = (option for option, number in zip(likely, groups, strict=True) if number < before or before == 1)
+        better = next((option for option in fewer if sum(lone for _, lone in _loose_parts(option)) < count), None)
+        if better is None:
+            break
+        program = better
+    return program
 
 
 def floating(program: Program) -> list[int]:
     """Which blocks have a part outside the largest connected solid of the program."""
-    return sorted({block for block, lone in _parts(program) if lone})
+    return sorted({block for block, lone in _loose_parts(program) if lone})
 
 
 @lru_cache(maxsize=64)
-def _parts(program: Program) -> list[tuple[int, bool]]:
+def _loose_parts(program: Program) -> list[tuple[int, bool]]:
     """The block of every part, and whether that is outside the largest connected solid."""
     scene = unroll(program)
     return list(zip(scene.block.tolist(), (pieces_of_parts(scene) != 0).tolist(), strict=True))
@@ -60,7 +61,7 @@ def _options(program: Program) -> list[Program]:
     """Programs without one floating block, and programs with one block extended to join floating and other parts."""
     body, chains, options, loose = program.body, program.chains, list[Program](), floating(program)
     originals = solid_boxes([chain[-1] for chain in chains])
-    parts = list(zip(itertools.chain(*solid_boxes(body)), _parts(program), strict=True))
+    parts = list(zip(itertools.chain(*solid_boxes(body)), _loose_parts(program), strict=True))
     for index, chain in enumerate(chains):
         ways: list[tuple[Node, ...]] = [()] if index in loose else []
         for side in (True, False) if len(originals[index]) == 1 else ():

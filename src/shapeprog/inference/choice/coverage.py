@@ -106,19 +106,19 @@ class Coverage:
         self._index: dict[Program, int] = {}
         self._rows: list[Array] = []
 
-    def table(self, blocks: Sequence[Node | Program]) -> CoverageTable:
+    def table(self, candidates: Sequence[Node | Program]) -> CoverageTable:
         """The coverage of candidates, which are nodes or programs.
 
         A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
         """
-        candidates = [block if isinstance(block, Program) else Program((block,)) for block in blocks]
-        scene = unroll(candidates).detach()
-        new = [candidate for candidate in dict.fromkeys(candidates) if candidate not in self._index]
+        programs = [each if isinstance(each, Program) else Program((each,)) for each in candidates]
+        scene = unroll(programs).detach()
+        new = [program for program in dict.fromkeys(programs) if program not in self._index]
         if new or not self._rows:
-            rows = self._rows_of(new, scene if len(new) == len(candidates) else unroll(new).detach())
+            rows = self._rows_of(new, scene if len(new) == len(programs) else unroll(new).detach())
             self._rows = list(map(np.concatenate, zip(self._rows, rows, strict=True))) if self._rows else rows
             self._index |= {program: index for index, program in enumerate(new, len(self._index))}
-        selected = np.array([self._index[candidate] for candidate in candidates], np.int64)
+        selected = np.array([self._index[program] for program in programs], np.int64)
         covered, interior, samples, sample_price, price = (row[selected] for row in self._rows)
         _, hidden = covers(scene, sorted_by_cell(samples.reshape(-1, 3)), 0.0)
         # The samples that are used and that no candidate hides by itself.

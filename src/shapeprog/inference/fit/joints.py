@@ -100,7 +100,7 @@ def _inner(scene: Scene, points: Float[Tensor, "C 3"]) -> Float[Tensor, "C 3"]:
 
 def _lowest(scene: Scene) -> Float[Tensor, "S 3"]:
     """The lowest points of primitives (S,)."""
-    points = torch.zeros_like(scene.centre)
+    points = scene.centre.clone()  # of parts that are too thin for a mesh
     for n, vertices, _ in part_meshes(scene, math.inf):
         points[n] = torch.from_numpy(vertices[vertices[:, 0] <= vertices[:, 0].min() + 1e-6]).mean(0)
     return points

@@ -85,6 +85,7 @@ class Tunable:
 
     def with_values(self, values: Float[Tensor, " F"]) -> Program:
         """The program with these numbers."""
+        assert len(values) == len(self.moving)
         new = map(to_float32, values.tolist())
 
         def changed(node: Node) -> Node:

@@ -67,7 +67,7 @@ class Parts:
         self.upright: Mask = self.slender & (self.rise >= 0.75)
         self.level: Mask = self.slender & (self.rise <= 0.35)
         self.board: Mask = (self.thin <= 0.3 * self.middle) & ~bent
-        self.facing: Mask = self.board & (self.depth == self.thin)  # to the front
+        self.frontal: Mask = self.board & (self.depth == self.thin)
         self.small: Mask = self.long <= 0.12 * self.size.max()
         self.tiny: Mask = self.up * self.side <= 0.012 * self.size[UP] * self.size[SIDE]  # seen from the front
         self.tiny &= self.depth <= self.size[DEPTH] / 4
@@ -126,7 +126,7 @@ class Parts:
         self.highest: Mask = self.top >= self.floor + self.size[UP] - self.near
         self.central: Mask = (np.abs(self.rear) <= 0.15) & (self.aside <= 0.15)
         self.behind: Mask = (self.rear > 0.1) & (self.aside < 0.3)
-        across = (self.facing & ~self.slender) | (self.level & (self.up > 2 * self.depth))
+        across = (self.frontal & ~self.slender) | (self.level & (self.up > 2 * self.depth))
         self.head_or_foot: Mask = across & (self.span >= 0.5)  # a board across the head or foot of a bed
         self.outermost: Mask = self.aside + self.span / 2 >= 0.4
         self.in_front: Mask = self.low[:, DEPTH] <= self.low[:, DEPTH].min() + 3 * self.near
@@ -155,7 +155,7 @@ class Parts:
         self.backed: Mask = self.cased | on_body | right_behind[:, on_body].any(1)
         broad_frontways = ~self.slender | (self.upright & (self.side >= self.size[SIDE] / 2))
         large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
-        self.front: Mask = self.facing & (broad_frontways | large)
+        self.front: Mask = self.frontal & (broad_frontways | large)
 
 
 def turned(vectors: FloatArray, turns: int) -> FloatArray:

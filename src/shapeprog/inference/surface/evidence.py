@@ -26,8 +26,8 @@ from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import HALF, RESOLUTION, SPAN, UP, BoolArray, FloatArray, IntArray, cells_at
 
-SPREAD = spiral(1 - (2 * np.arange(32) + 1) / 32)
-DIRECTIONS = SPREAD / np.abs(SPREAD).max(1, keepdims=True)
+_SPREAD = spiral(1 - (2 * np.arange(32) + 1) / 32)
+DIRECTIONS = _SPREAD / np.abs(_SPREAD).max(1, keepdims=True)
 """Directions (32, 3) spread evenly over the sphere, the largest coordinate 1 or -1."""
 
 

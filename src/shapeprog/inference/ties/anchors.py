@@ -91,7 +91,7 @@ class _AxisAnchors:
         return element.high - element.low <= least <= TIES.board * second
 
     def _choices(self, element: Element) -> Sequence[Anchors]:
-        off = max(TIES.reach * self.extent, TIES.within * (element.kind != "interval"))
+        off = max(TIES.off_middle * self.extent, TIES.within * (element.kind != "interval"))
         centred = abs(element.middle - self.extent / 2) < off and self.axis < 2
         if element.kind != "interval":
             if self.axis == 2 and element.key != "plane":
@@ -109,7 +109,7 @@ class _AxisAnchors:
         """Both ends of a rod; if they are at equal distances from the middle they stay so."""
         ends, wide = [self.elements[k].low for k in (start, end)], TIES.spanning * self.extent
         span = start, end, TIES.resized * max(0.0, 1 - abs(ends[0] - ends[1]) / wide)
-        if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * TIES.reach * self.extent:
+        if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * TIES.off_middle * self.extent:
             sides = (LOW, HIGH) if ends[0] < ends[1] else (HIGH, LOW)
             self.choices[start], self.choices[end] = ([(MIDDLE,), (side,)] for side in sides)
             self.images.append(span)
@@ -118,7 +118,7 @@ class _AxisAnchors:
 
     def _unary(self, element: Element, anchors: Anchors) -> float:
         extent = self.extent
-        cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.reach * extent
+        cost, centred = 0.0, abs(element.middle - extent / 2) <= TIES.off_middle * extent
         ends = (element.low, element.high) if len(anchors) > 1 else (element.middle,)
         for end, anchor in zip(ends, anchors, strict=True):
             if anchor == MIDDLE:

@@ -86,7 +86,7 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
 
 def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[Solution, FloatArray]:
     """The numbers (P,) of a program as expressions of other free ones, so that fewer parts are separated when a shared
-    one changes; and the values of these (Z,)."""
+    one changes: at most one is measured from each; and the values of these (Z,)."""
     contacts, free = _Contacts(layout, numbers), solution.free
     factors, values = solution.factors.copy(), numbers[free]
     several = np.flatnonzero(np.count_nonzero(factors, axis=0) > 1).tolist()

@@ -182,7 +182,7 @@ class Layout:
         off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
         left_out = {*SIZES[:2], "radius"}
         keywords: Keywords = (("radius", dict(line.keywords).get("radius", size / 2)),)
-        if line.kind == "cylinder" and size > TIES.fills * width and off < TIES.reach * width:
+        if line.kind == "cylinder" and size > TIES.fills * width and off < TIES.off_middle * width:
             left_out, keywords = {*AXES[0], *AXES[1], "radius"}, (("width", size), ("depth", size))
         return replace(line, keywords=(*(pair for pair in line.keywords if pair[0] not in left_out), *keywords))
 
@@ -251,7 +251,7 @@ class Layout:
         straight = abs(float(dict(bar.keywords).get("turn", 0))) <= TIES.degrees  # type: ignore[arg-type]
         off = max(abs(ends_of(bar, key, axis, self._sizes)[0] - extent / 2) for key in ("start", "end"))
         low, high = ends_of(bar, "across", axis, self._sizes)
-        if axis < 2 and straight and off < TIES.reach * extent:
+        if axis < 2 and straight and off < TIES.off_middle * extent:
             (element,) = self._elements(index, "across", (axis,))
             if element.anchors == (LOW, HIGH):
                 value = self._slot(index, AXES[axis].low, "clearance", axis, (extent - (high - low)) / 2)

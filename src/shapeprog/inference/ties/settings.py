@@ -35,9 +35,9 @@ class TieSettings:
     repeats: int = 6  # most times at one price that parts are tied which come apart,
     heavier: float = 10.0  # each time with so many times the weight of their joints
 
-    # Price of the number that a relation saves, as a multiple of the usual price.  That is the price for zeros; equal
-    # sections, equal sizes of parts of one role, and equal clearances, of a part at a corner, of parts at one side or
-    # at opposite sides, or of a row along one axis.
+    # Price of the number that a relation saves, as a multiple of the usual price.  All others have the usual price:
+    # zeros, equal sections, equal sizes of parts of one role, and equal clearances (of a part at a corner, of parts at
+    # one side or at opposite sides, of a row along one axis); faces of one side that touch have half of it.
     floor: float = 6.0  # a part that ends just above the floor
     # Equal clearances on the left and right, in front and at the rear, above and below
     symmetric: tuple[float, float, float] = (4.0, 2.0, 2.0)
@@ -65,7 +65,8 @@ class TieSettings:
     from_top: float = 0.25  # of a height measured from the top by a part that is not near it: people expect the floor
 
     # Shares of the whole
-    reach: float = 0.02  # up to this a face reaches a side, a part the floor, or the middle of a part that of the whole
+    reach: float = 0.02  # up to this a face reaches a side, or a part the floor
+    off_middle: float = 0.02  # by which the middle of a part may miss that of the whole
     beyond: float = 0.3  # parts wholly beyond this share of the half are near that side
     below: float = 0.1  # parts whose top is so far below that of the whole are near the top
     board: float = 0.4  # the thickness of a board is at most this share of its next longer side

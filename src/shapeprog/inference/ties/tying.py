@@ -2,7 +2,7 @@
 
 Parts are placed from the sides of the whole; every face gets an anchor.  Relations between the numbers that nearly
 hold are priced by their cost in fit, those cheaper than a number are imposed, and the numbers that stay free are
-refitted.  Where a change of a shared number would separate parts, others are measured from it.  Shared numbers are
+refitted.  Where a change of a shared number would separate parts, another is measured from it.  Shared numbers are
 then named.
 """
 

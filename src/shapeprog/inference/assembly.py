@@ -9,6 +9,7 @@ Pieces become candidates by the hints of statements, not by their names.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
@@ -83,16 +84,23 @@ def _candidates(evidence: Evidence) -> list[Node]:
 def _chosen(
     candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
 ) -> tuple[list[Node], list[Node]]:
-    """A choice among a first one, its adjusted form and neighbours, boxes around unexplained points, and candidates
-    passed over; and the others, those that would explain most of the rest first."""
+    """A choice among a first one, for scans another with a wide tolerance, their adjusted forms and neighbours, boxes
+    around unexplained points, and candidates passed over; and the others, those that would explain most of the rest
+    first."""
     evidence = coverage.evidence
     first, others = _choice(candidates, coverage, blocks, seed)
     if not first or deadline.passed("another choice among neighbours"):
         return first, others
-    adjusted = adjust(Program(tuple(first)), evidence, steps=8, deadline=deadline)
-    pool = [*first, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence), *others[:200]]
+    starts = [first]
+    if evidence.mesh is None:  # few candidates on a scan are close to its surface before their numbers are adjusted
+        wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
+        starts.append(_choice(candidates, Coverage(wide, coverage.prices), blocks, seed)[0])
+    pool = first.copy()
+    for nodes in starts:
+        adjusted = adjust(Program(tuple(nodes)), evidence, steps=8, deadline=deadline)
+        pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
     # The search starts at the first choice, whose blocks are the first of the pool.
-    return _choice(list(dict.fromkeys(pool)), coverage, blocks, seed, range(len(first)))
+    return _choice(list(dict.fromkeys([*pool, *others[:200]])), coverage, blocks, seed, range(len(first)))
 
 
 def _choice(

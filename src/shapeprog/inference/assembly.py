@@ -84,23 +84,21 @@ def _candidates(evidence: Evidence) -> list[Node]:
 def _chosen(
     candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
 ) -> tuple[list[Node], list[Node]]:
-    """A choice among a first one, for scans another with a wide tolerance, their adjusted forms and neighbours, boxes
-    around unexplained points, and candidates passed over; and the others, those that would explain most of the rest
-    first."""
+    """A choice among a first one, one with a wide tolerance, their adjusted forms and neighbours, boxes around
+    unexplained points, and candidates passed over; and the others, those that would explain most of the rest first.
+    """
     evidence = coverage.evidence
     first, others = _choice(candidates, coverage, blocks, seed)
     if not first or deadline.passed("another choice among neighbours"):
         return first, others
-    starts = [first]
-    if evidence.mesh is None:  # few candidates on a scan are close to its surface before their numbers are adjusted
-        wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
-        starts.append(_choice(candidates, Coverage(wide, coverage.prices), blocks, seed)[0])
+    wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
+    loose, _ = _choice(candidates, Coverage(wide, coverage.prices), blocks, seed)
     pool = first.copy()
-    for nodes in starts:
+    for nodes in [first, loose] if loose != first else [first]:
         adjusted = adjust(Program(tuple(nodes)), evidence, steps=8, deadline=deadline)
         pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
-    # The search starts at the first choice, whose blocks are the first of the pool.
-    return _choice(list(dict.fromkeys([*pool, *others[:200]])), coverage, blocks, seed, range(len(first)))
+    pool = list(dict.fromkeys([*pool, *others[:200]]))  # the first choice first: the search starts there
+    return _choice(pool, coverage, blocks, seed, range(len(first)))
 
 
 def _choice(

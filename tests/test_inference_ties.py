@@ -19,7 +19,7 @@ from shapeprog.cli.app import app
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import evidence_of_program
-from shapeprog.inference.ties import tying
+from shapeprog.inference.ties import anchors, tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.elements import Slot
 from shapeprog.inference.ties.expressions import DISTANCES, _carriable, carried, solved
@@ -581,6 +581,15 @@ def test_faces_are_measured_from_the_side_that_keeps_them_in_contact():
     assert float(high.max() - low.min()) == pytest.approx(24 + 24 * 24 / 24, abs=0.1)
     growth = sorted(np.round(2 * (half - unroll(program).size[:, 0]).numpy(), 1).tolist())
     assert growth == [0, 0, 0, 0, 24, 24]
+
+
+@pytest.mark.parametrize("ahead", [1, 3])
+def test_anchors_do_not_depend_on_how_many_are_tried_at_once(monkeypatch: pytest.MonkeyPatch, ahead: int):
+    source = placed(sp.parse(TABLE)).source
+    assert source is not None
+    expected = anchors_of(Layout(source))
+    monkeypatch.setattr(anchors, "TIES", replace(TIES, ahead=ahead))
+    assert anchors_of(Layout(source)) == expected
 
 
 def test_a_stretcher_between_legs_that_lean_is_measured_from_where_it_still_meets_them():

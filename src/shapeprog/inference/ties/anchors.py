@@ -154,13 +154,19 @@ class _AxisAnchors:
         """The cost and state (K,) from which no change of an element is cheaper."""
         total, (count, most) = float(self._costs(state[None], exact=exact)[0]), self.costs.shape
         for _ in range(8):
-            before = state
-            for k in range(count):
-                trials = np.tile(state, (most, 1))
-                trials[:, k] = np.arange(most)
-                costs = self._costs(trials, exact=exact)
-                if costs.min() < total - 1e-9:
-                    state, total = trials[costs.argmin()], float(costs.min())
+            before, k = state, 0
+            while k < count:  # from here on the next element that is cheaper with another choice
+                ahead = min(TIES.ahead, count - k)
+                trials = np.tile(state, (ahead, most, 1))
+                trials[np.arange(ahead), :, np.arange(k, k + ahead)] = np.arange(most)
+                costs = self._costs(trials.reshape(-1, count), exact=exact).reshape(-1, most)
+                cheaper = costs.min(1) < total - 1e-9
+                if not cheaper.any():
+                    k += ahead
+                    continue
+                first = int(cheaper.argmax())
+                state, total = trials[first, costs[first].argmin()], float(costs[first].min())
+                k += first + 1
             if state is before:
                 break
         return total, state

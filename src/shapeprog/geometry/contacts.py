@@ -6,12 +6,12 @@ Pairs whose boxes along the axes of the grid overlap are compared by alternating
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import array, table_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.kernels.table import CENTRE, ROTATION, WIDTH
+from shapeprog.space import BoolArray
 
 TOUCHING = 0.02
 """Gap in cells up to which parts touch."""
@@ -28,7 +28,7 @@ def contact_groups(scenes: Batch) -> list[int]:
     return [connected_components(graph[here][:, here])[0] for graph, here in graphs]
 
 
-def touching(scenes: Batch, within: float) -> npt.NDArray[np.bool_]:
+def touching(scenes: Batch, within: float) -> BoolArray:
     """Which primitives of each scene of a batch (B, N) lie ``within`` cells of which later ones (B, N, N).
 
     Projections of parts that barely overlap may end before they meet: such parts count as apart.

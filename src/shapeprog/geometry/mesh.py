@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import array
@@ -14,7 +13,7 @@ from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.primitive import Mesh as Triangles
 from shapeprog.geometry.primitives import primitives
 from shapeprog.lazy_torch import torch
-from shapeprog.space import Array, FloatArray
+from shapeprog.space import Array, BoolArray, FloatArray, IntArray
 
 FLAT = 1e-5
 """A part that is thinner than this, in cells, or fills less than this share of the box around it, has no solid to mesh
@@ -37,7 +36,7 @@ class PartMesh(NamedTuple):
 
     slot: int
     vertices: FloatArray
-    faces: npt.NDArray[np.int64]
+    faces: IntArray
 
 
 class Solids(NamedTuple):
@@ -46,7 +45,7 @@ class Solids(NamedTuple):
     ``half`` are half extents of the box around each in its local frame.
     """
 
-    solid: npt.NDArray[np.bool_]
+    solid: BoolArray
     size: FloatArray
     centre: FloatArray
     rotation: FloatArray
@@ -127,7 +126,7 @@ def union_mesh(scene: Batch) -> Triangles:
     return union.vert_properties[:, :3].astype(np.float64), np.asarray(union.tri_verts, np.int64)
 
 
-def pieces_of_parts(scene: Batch) -> npt.NDArray[np.int64]:
+def pieces_of_parts(scene: Batch) -> IntArray:
     """The connected solid of the union to which each primitive (N,) of one scene belongs, 0 for that with most surface.
 
     Two parts are connected if their union is one solid: parts that meet only along an edge or in a point are not.  A

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Chain, Draw, Program, nest
@@ -16,7 +15,7 @@ from shapeprog.language.statement import language
 from shapeprog.library.blocks import PAIR, Block, Kind, Slot, blocks_of
 from shapeprog.library.length import STATEMENT, length
 from shapeprog.library.measures import LEAST_EXTENT, Group, Measure, boxes_of, measures, moved, relations
-from shapeprog.space import FloatArray
+from shapeprog.space import BoolArray, FloatArray
 
 NEAR = 0.03
 """Tolerance of a relation, in cells."""
@@ -199,7 +198,7 @@ def _best_in(
     offered = _offered(group, all_measures, openings)
     holds = np.abs(values @ offered.T) <= NEAR
     owner = np.repeat(np.arange(len(group.slots)), [len(slots) for slots in group.slots])
-    alive: npt.NDArray[np.bool_] = np.ones(len(uses), np.bool_)
+    alive: BoolArray = np.ones(len(uses), np.bool_)
     rows: FloatArray = np.zeros((0, group.size))
     joined = 0
     best: Candidate | None = None

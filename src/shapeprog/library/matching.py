@@ -15,7 +15,6 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Call, Function, Source, changed_lines, changed_values
@@ -28,7 +27,7 @@ from shapeprog.language.program import Node, Program
 from shapeprog.library.blocks import Block, Kind, blocks_of
 from shapeprog.library.independence import independent
 from shapeprog.library.length import terms, written
-from shapeprog.space import FloatArray
+from shapeprog.space import BoolArray, FloatArray
 
 TOLERANCE = 0.05
 """Largest difference in cells between a number of a program and that of a call that replaces it."""
@@ -294,7 +293,7 @@ class Matcher:
         constants = np.concatenate([form.constants for form in targets])
         values = np.concatenate([form.block.values for form in mine])
         defaults = [pattern.defaults[name] for name in pattern.measures]
-        free: npt.NDArray[np.bool_] = np.any(factors, 0)  # the spacing of a row of one copy has no effect
+        free: BoolArray = np.any(factors, 0)  # the spacing of a row of one copy has no effect
         if np.linalg.matrix_rank(factors) < free.sum() or any(
             default is None for default, used in zip(defaults, free, strict=True) if not used
         ):

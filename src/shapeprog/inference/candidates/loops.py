@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
@@ -25,13 +24,13 @@ from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.language.hints import Box
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Loop, Node, Program, nest
-from shapeprog.space import DEPTH, SIDE, FloatArray
+from shapeprog.space import DEPTH, SIDE, FloatArray, IntArray
 
 
 class Profiles(NamedTuple):
     """Profiles of candidates: equal for copies by translation, whatever the order of the axes of their solids."""
 
-    kind: npt.NDArray[np.int64]  # a number for the statements and counts of each block (C,)
+    kind: IntArray  # a number for the statements and counts of each block (C,)
     middle: FloatArray  # middle (C, 3) of the box around each along the axes of the grid, in cells
     half: FloatArray  # half extents (C, 3) of that box
     distance: FloatArray  # signed distances (C, 27) of the surface from its middle, corners, edges and faces
@@ -117,7 +116,7 @@ def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
     steps = positions[None] - positions[:, None]
     tree, count = cKDTree(positions), len(positions)
 
-    def nearest(targets: FloatArray) -> npt.NDArray[np.int64]:
+    def nearest(targets: FloatArray) -> IntArray:
         """The index of the position at each target (..., 3); -1 if none."""
         index = tree.query(targets, p=np.inf, distance_upper_bound=SETTINGS.stray)[1]
         return np.where(index < count, index, -1)
@@ -191,7 +190,7 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
     share = on(points)
     supported = share >= SETTINGS.supported
 
-    def kept(index: npt.NDArray[np.int64], image: FloatArray) -> npt.NDArray[np.int64]:
+    def kept(index: IntArray, image: FloatArray) -> IntArray:
         """Those candidates whose images (C, P, 3) lie on the surface."""
         return index[on(image) >= SETTINGS.as_well * share[index]]
 

@@ -19,7 +19,7 @@ from shapeprog.inference.choice.bits import Bits
 from shapeprog.inference.choice.choice_kernels import search
 from shapeprog.inference.choice.coverage import CoverageTable
 from shapeprog.inference.choice.settings import SETTINGS
-from shapeprog.space import Array
+from shapeprog.space import Array, IntArray
 
 
 def choose(
@@ -60,7 +60,7 @@ def choose(
     return tuple(np.sort(index[selected[selected >= 0]]).tolist())
 
 
-def _words(rows: Bits) -> tuple[Bits, npt.NDArray[np.uint32], npt.NDArray[np.int64]]:
+def _words(rows: Bits) -> tuple[Bits, npt.NDArray[np.uint32], IntArray]:
     """The words that hold bits, row after row, their indices, and the first of each row."""
     row, words = np.nonzero(rows)
     return rows[row, words], words.astype(np.uint32), np.searchsorted(row, np.arange(len(rows) + 1))

@@ -19,7 +19,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import torch
 
 from shapeprog.geometry.arrays import over_threads
@@ -36,7 +35,7 @@ from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
-from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, Array, FloatArray
+from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, Array, BoolArray, FloatArray, IntArray
 
 AWAY = 4.0 * HALF  # a coordinate outside all candidates, by which unused samples of a word are known
 
@@ -149,7 +148,7 @@ class Coverage:
         return [covered, interior, samples, prices.unsupported / evidence.area * cost, price]
 
 
-def centred(scene: Scene, candidates: Sequence[Program]) -> npt.NDArray[np.int64]:
+def centred(scene: Scene, candidates: Sequence[Program]) -> IntArray:
     """Number of axes (B,) along which a candidate is centred, left to right or in depth; each saves one number.
 
     The position of a centred part follows from its size.  Mirrored and rotated candidates save none, nor does a pair
@@ -167,7 +166,7 @@ def _around(node: Node, axis: int) -> bool:
     return pair or mirrors(node, axis) or node.name.startswith("rotate")
 
 
-def square(scene: Scene) -> npt.NDArray[np.bool_]:
+def square(scene: Scene) -> BoolArray:
     """Whether the first primitive of a candidate (B,) is a bar of square section, whose sides will be one number.
 
     Without this, a round bar is cheaper than a square one.
@@ -201,9 +200,7 @@ def free_points(evidence: Evidence) -> tuple[FloatArray, float]:
     return points[np.argsort(nearby(points), kind="stable")], len(cells) * side**3 / max(count, 1)
 
 
-def unsupported(
-    scene: Scene, evidence: Evidence, binned: BinnedPoints
-) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:
+def unsupported(scene: Scene, evidence: Evidence, binned: BinnedPoints) -> tuple[FloatArray, IntArray, FloatArray]:
     """Samples of the surfaces of candidates (B, N) that the target, whose surface is ``binned``, does not support.
 
     Returns points (S, 3) just above the surface, indices of their candidates (S,), and the area charged for each (S,).

@@ -299,16 +299,12 @@ def test_a_statement_of_a_users_own_is_proposed_by_its_hint():
         assert words(found)["drum"] == 1
         assert found.size == 2
         assert sorted(set(words(found)) - {"drum"})[0] in ("mirror", "translate")
+        # No placed form: the numbers are hundredths of cells.
+        program = sp.infer(whole(text)).program
+        assert program.scale is None
+        values = [value for node in program.walk() for value in node.values]
+        assert np.allclose(values, np.round(values, 2), atol=1e-5)
     assert "drum" not in language()
-
-
-def test_a_program_without_a_placed_form_is_written_in_hundredths_of_cells():
-    with using(without_the_paper()) as own:
-        own.register(LANGUAGE["cone_leg"])
-        program = sp.infer(load(EXAMPLES / "cabinet_quaternius_night_stand.obj")).program
-    assert program.scale is None
-    values = [value for node in program.walk() for value in node.values]
-    assert np.allclose(values, np.round(values, 2), atol=1e-5)
 
 
 def test_two_fronts_on_a_case_are_two_parts_though_the_gap_between_them_is_narrow():

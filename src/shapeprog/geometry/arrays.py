@@ -10,6 +10,7 @@ from functools import cache, wraps
 from typing import Any
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.batch import Batch
@@ -68,7 +69,8 @@ _kernel_threads = 0  # threads that kernels run in; 0 for as many as torch has
 
 @contextmanager
 def one_tensor_thread(kernels: int = 0) -> Iterator[None]:
-    """Let torch compute in one thread within: its idle threads would spin on the cores.
+    """Let torch and the linear algebra of NumPy compute in one thread within: idle threads would spin on the cores, and
+    sums of several threads differ in their last digits from those of one.
 
     Kernels keep as many threads as there were, or run in ``kernels``.
     """
@@ -77,7 +79,8 @@ def one_tensor_thread(kernels: int = 0) -> Iterator[None]:
     torch.set_num_threads(1)
     _kernel_threads = kernels or before[1] or before[0]
     try:
-        yield
+        with _libraries().limit(limits=1, user_api="blas"):
+            yield
     finally:
         torch.set_num_threads(before[0])
         _kernel_threads = before[1]
@@ -97,6 +100,11 @@ def over_threads(work: Callable[[int, int], None], count: int, *, least: int = 1
     work(0, cuts[1])
     for job in jobs:
         job.result()
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 @cache

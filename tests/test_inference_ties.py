@@ -19,7 +19,7 @@ from shapeprog.cli.app import app
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import evidence_of_program
-from shapeprog.inference.ties import anchors, tying
+from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.elements import Slot
 from shapeprog.inference.ties.expressions import DISTANCES, _carriable, carried, solved
@@ -583,15 +583,6 @@ def test_faces_are_measured_from_the_side_that_keeps_them_in_contact():
     assert growth == [0, 0, 0, 0, 24, 24]
 
 
-@pytest.mark.parametrize("ahead", [1, 3])
-def test_anchors_do_not_depend_on_how_many_are_tried_at_once(monkeypatch: pytest.MonkeyPatch, ahead: int):
-    source = placed(sp.parse(TABLE)).source
-    assert source is not None
-    expected = anchors_of(Layout(source))
-    monkeypatch.setattr(anchors, "TIES", replace(TIES, ahead=ahead))
-    assert anchors_of(Layout(source)) == expected
-
-
 def test_a_stretcher_between_legs_that_lean_is_measured_from_where_it_still_meets_them():
     program = sp.parse("""
 width, depth, height = 20, 10, 12
@@ -635,7 +626,7 @@ def test_distances_are_measured_from_another_number_and_sizes_are_not():
     layout = Layout(source)
     count = len(layout.slots)
     front = layout.index[layout.parts[1], "front"]
-    carriable = _carriable(np.eye(count), [*range(count)], layout, {*layout.parts}, front)
+    carriable = _carriable(np.eye(count), [*range(count)], layout, front)
     assert carriable
     assert {layout.slots[k].kind for k in carriable} <= {*DISTANCES}
 

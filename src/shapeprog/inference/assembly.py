@@ -46,10 +46,7 @@ class Assembly(NamedTuple):
 def assemble(
     coverage: Coverage, *, blocks: int = 10, seed: int = 0, deadline: Deadline = NEVER, progress: Progress | None = None
 ) -> Assembly:
-    """A program of at most ``blocks`` blocks for the surface of a mesh or a point cloud; the same for the same seed.
-
-    The seed is that of the search among candidates.  Samples of surfaces are the same for all seeds.
-    """
+    """A program of at most ``blocks`` blocks for the surface of a mesh or a point cloud; the same for the same seed."""
     evidence, report = coverage.evidence, progress or (lambda step, share: None)
     report("finding structure", 0.1)
     candidates = _candidates(evidence)

@@ -1,8 +1,5 @@
-"""The time budget of inference: a safety net, far from the common path.
-
-Rounds, steps and the seed decide the result.  Only if the budget is too short for a shape does the result depend on
-the speed and the load of the machine, and it reports that.
-"""
+"""The time budget of inference: a safety net.  Only if it is too short for a shape, which the result reports, does the
+result depend on the speed and the load of the machine."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class Candidate(NamedTuple):
 
 
 class Option(NamedTuple):
-    """A block of a program inside of some of its loops: its index, these loops, and its form without a role."""
+    """A block of a program inside of some of its loops: its index, these loops, and its form."""
 
     place: int
     around: tuple[Loop, ...]
@@ -56,7 +56,11 @@ def with_calls(program: Program, library: Library, coverage: Coverage) -> tuple[
     """A program in cells with blocks moved to where calls of functions draw them, if it loses little value and nothing
     floats: one node for each block, and the indices of those that calls draw."""
     nodes = list(program.flat().body)
-    options = _options(program)
+    options = [
+        Option(index, tuple(node for node in chain[:depth] if isinstance(node, Loop)), block)
+        for index, chain in enumerate(program.chains)
+        for depth in range(len(chain)) for block in forms_of(chain[depth:])
+    ]  # fmt: skip
     patterns = [item for item in library.patterns if item.shortens and item.blocks > 1]
     candidates = [candidate for pattern in patterns for candidate in _candidates(pattern, options)]
     candidates.sort(key=lambda candidate: (-len(candidate.replaced), candidate.difference))
@@ -83,16 +87,6 @@ def _with_one_role(candidate: Candidate, nodes: Sequence[Node]) -> Iterator[Node
         yield nest((*loops, replace(draw, role=role) if role and role != draw.name else draw))
 
 
-def _options(program: Program) -> list[Option]:
-    options: list[Option] = []
-    for index, chain in enumerate(program.chains):
-        loops = tuple(node for node in chain if isinstance(node, Loop))
-        for depth in range(len(chain)):
-            blocks = (block._replace(kind=replace(block.kind, word="")) for block in forms_of(chain[depth:]))
-            options += (Option(index, loops[:depth], block) for block in blocks)
-    return options
-
-
 def _candidates(pattern: Pattern, options: Sequence[Option]) -> list[Candidate]:
     """The calls of a function that draw nearly the same as some blocks, the nearest first."""
     candidates: list[Candidate] = []
@@ -112,8 +106,9 @@ def _assigned(forms: Sequence[Form], options: Sequence[Option], start: FloatArra
     """Blocks for all forms of a function, as near to those of one call as ``LOOSE``."""
     assigned: list[tuple[Option, ...]] = [()]
     for form in forms:
-        like = replace(form.block.kind, word=""), form.block.counts
-        fitting = [option for option in options if (option.block.kind, option.block.counts) == like]
+        kind, counts = form.block.kind, form.block.counts
+        alike = [option for option in options if replace(option.block.kind, word=kind.word) == kind]
+        fitting = [option for option in alike if option.block.counts == counts]
         longer = ((*blocks, option) for blocks in assigned for option in fitting)
         assigned = [blocks for blocks in longer if _solved(forms, blocks, start)[1] <= LOOSE]
     return assigned
@@ -128,9 +123,9 @@ def _solved(forms: Sequence[Form], blocks: Sequence[Option], start: FloatArray) 
     kinds = {tuple(loop.name for loop in option.around) for option in blocks}
     if len({option.place for option in blocks}) < len(blocks) or len(kinds) > 1:
         return start, np.inf
-    factors = np.concatenate([form.factors for form in forms[: len(blocks)]])
-    constants = np.concatenate([form.constants for form in forms[: len(blocks)]])
-    away = np.concatenate([option.block.values for option in blocks]) - constants - factors @ start
+    pairs = [*zip(forms, blocks, strict=False)]
+    factors = np.concatenate([form.factors for form, _ in pairs])
+    away = np.concatenate([option.block.values - form.constants for form, option in pairs]) - factors @ start
     change = np.linalg.lstsq(factors, away, rcond=None)[0]
     outer = np.array([[value for loop in option.around for value in loop.values] for option in blocks])
     return start + change, float(max(np.abs(factors @ change - away).max(), np.abs(outer - outer[0]).max(initial=0)))

@@ -2,9 +2,8 @@
 
 A mesh or a point cloud is searched on its surface (:func:`~shapeprog.inference.assembly.assemble`).  Voxels, shapes
 with ``statements="paper"``, and shapes whose surface gives no program are searched on cells
-(:func:`~shapeprog.inference.cells.reconstruct.reconstruct`).  Unless ``statements="paper"``, blocks near calls of
-library functions are moved onto them, parts are placed from the sides of the whole, numbers are tied, and calls are
-written.  Lengths get a unit and are rounded.
+(:func:`~shapeprog.inference.cells.reconstruct.reconstruct`).  Unless ``statements="paper"``, blocks move onto calls of
+library functions, parts are placed from the sides of the whole, and numbers are tied.
 """
 
 from __future__ import annotations
@@ -114,8 +113,7 @@ def infer(
 ) -> Result:
     """A short program of at most ``blocks`` blocks, drawing statements with loops around them, that rebuilds a shape.
 
-    The result is the same for the same seed unless the time budget ends a step early, which ``cut`` and ``reason``
-    report.
+    The result is the same for the same seed unless the time budget ends a step early, which ``cut`` reports.
 
     Parameters
     ----------
@@ -135,15 +133,14 @@ def infer(
     detail
         Factor by which the prices of blocks and numbers are divided: above 1 the program is finer.
     ties
-        Whether numbers that hold together are tied: the program then has names for the few that are free, and
-        expressions for all others.
+        Whether numbers that hold together are tied: the few that are free have names, all others are expressions.
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
         Parts that are nearly a call of a function move to where the call draws them.
     unit
         Unit of the lengths of the program: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; by default that of the file, and
-        cells for voxels.  The numbers are rounded as a person would, by which nothing moves farther than .015 cells;
-        those of more than 256 primitives are not.
+        cells for voxels.  The numbers of up to 256 primitives are rounded, by which nothing moves farther than .015
+        cells.
     progress
         Called with the name of the current step and the share of it that is done.
 
@@ -187,7 +184,9 @@ def infer(
         if libraries:
             final, held = with_calls(final, joined(libraries), coverage)
         if ties:
-            final = tie(final, evidence, floor=floor, held=held, progress=progress)
+            final = tie(final, evidence, floor=floor, held=held)
+            if progress:
+                progress("tying numbers", 1.0)
         cells = target.voxels
         if snapped is None or description_length(final, cells) <= description_length(program, cells, snapped):
             program, snapped = final, None
@@ -207,8 +206,8 @@ def infer(
         reason += "with a larger --budget the result depends on the seed alone."
     if snapped is not None or target.points is None:
         scores["iou"] = float(iou(occupied(program, unroll(program), snapped), pack(target.voxels)))
-    sizes = {"blocks": program.blocks, "statements": program.statements, "primitives": program.size}
-    scores |= {name: float(size) for name, size in (sizes | {"numbers": numbers(program)}).items()}
+    sizes = program.blocks, program.statements, program.size, numbers(program)
+    scores |= zip(("blocks", "statements", "primitives", "numbers"), map(float, sizes), strict=True)
     return Result(program, snapped, scores, reason, cut, time.monotonic() - started)
 
 

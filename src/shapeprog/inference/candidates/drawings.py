@@ -82,10 +82,7 @@ def solid_boxes(nodes: Sequence[Node]) -> list[list[Box]]:
 
 def simplest(program: Program) -> Program:
     """The program, of one node for each block, drawn by the statements with the fewest numbers, of those with a hint
-    that draw the same solid.
-
-    Blocks are unchanged if their statement has a pivot or does not draw exactly one solid.
-    """
+    that draw the same solid; blocks whose statement has a pivot or does not draw exactly one solid are unchanged."""
     plain = []
     for draw, solids in zip(program.draws, solid_boxes(program.draws), strict=True):
         declared = language()[draw.name]
@@ -97,11 +94,8 @@ def simplest(program: Program) -> Program:
 
 
 def canonical_side(program: Program) -> Program:
-    """The program, of one node for each block, where parts mirrored about the middle of the shape are drawn on the left
-    and at the rear.
-
-    Blocks are unchanged if their statement cannot draw the mirror image, or if they have loops other than mirrors.
-    """
+    """The program, of one node for each block, where parts whose only loops are mirrors about the middle of the shape
+    are drawn on the left and at the rear, if their statement can."""
     draws = program.draws
     for index, ((*loops, _), solids) in enumerate(zip(program.chains, solid_boxes(draws), strict=True)):
         if len(solids) != 1 or any(loop.name != "mirror" for loop in loops):

@@ -39,8 +39,8 @@ class Profiles(NamedTuple):
 def profiles(nodes: Sequence[Node]) -> Profiles:
     """The profiles of blocks, at least one."""
     scene = scene_of(nodes)
-    there = scene.mask[..., None]
-    low, high = ((scene.centre + sign * scene.reach).where(there, -sign * torch.inf) for sign in (-1, 1))
+    there, reach = scene.mask[..., None], scene.reach
+    low, high = ((scene.centre + sign * reach).where(there, -sign * torch.inf) for sign in (-1, 1))
     ends = torch.stack([low.amin(1), high.amax(1)]).nan_to_num(posinf=0, neginf=0)
     middle, half = ends.mean(0), (ends[1] - ends[0]) / 2
     signs = torch.cartesian_prod(*[torch.tensor([-1.0, 0.0, 1.0], dtype=torch.float64)] * 3)
@@ -89,30 +89,26 @@ def _runs(nodes: Sequence[Node]) -> list[Node]:
     if len(nodes) < 2:
         return []
     kind, middle, half, distance = profiles(nodes)
-    step_of: dict[tuple[int, ...], FloatArray] = {}
     copies = cdist(half, half, "chebyshev") <= SETTINGS.alike * np.linalg.norm(half, axis=1)[:, None]
     copies &= (cdist(distance, distance, "chebyshev") <= SETTINGS.level) & (kind[:, None] == kind)
-    groups = {tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in copies}
-    for group in sorted(group for group in groups if len(group) > 1):
-        positions = middle[list(group)]
-        for run in equal_steps(positions, half[group[0]]):
-            members = tuple(group[index] if index >= 0 else -1 for index in run)
-            step_of.setdefault(members, (positions[run[-1]] - positions[run[0]]) / (len(run) - 1))
-    longest = sorted(step_of, key=lambda members: (-len(members), members))[: SETTINGS.most_runs]
-    return distinct([_translated(nodes[members[0]], len(members), step_of[members]) for members in longest])
+    runs = set[tuple[int, ...]]()
+    for group in {tuple(np.flatnonzero(row)[: SETTINGS.most_alike].tolist()) for row in copies[copies.sum(1) > 1]}:
+        members = (*group, -1)  # a missing copy has the index -1
+        found = equal_steps(middle[list(group)], half[group[0]])
+        runs.update(tuple(members[index] for index in run) for run in found)
+    longest = sorted(runs, key=lambda run: (-len(run), run))[: SETTINGS.most_runs]
+    return distinct([_row(nodes[run[0]], len(run), middle[run[-1]] - middle[run[0]]) for run in longest])
 
 
-def _translated(node: Node, count: int, step: FloatArray) -> Loop:
-    step = np.where(np.abs(step) * (count - 1) < SETTINGS.centred, 0.0, step)
+def _row(node: Node, count: int, way: FloatArray) -> Loop:
+    """So many copies of a node, ``way`` (3,) being that from the first to the last."""
+    step = np.where(np.abs(way) < SETTINGS.centred, 0.0, way / (count - 1))
     return Loop("translate", loop_values(count, *step.tolist()), (node,))
 
 
 def equal_steps(positions: FloatArray, half: FloatArray) -> list[list[int]]:
-    """Runs of two or more positions (N, 3) at equal steps, as indices, upwards or to the rear or to the left.
-
-    A copy may be missing, as -1, if most are present: the copy that fills the gap has no support, which lowers
-    its score.  ``half`` (3,) are the half extents of a copy.
-    """
+    """Runs of two or more positions (N, 3) at equal steps, as indices, upwards or to the rear or to the left.  A copy
+    may be missing, as -1, if most are present.  ``half`` (3,) are the half extents of a copy."""
     steps = positions[None] - positions[:, None]
     tree, count = cKDTree(positions), len(positions)
 
@@ -166,8 +162,7 @@ def rows(blocks: Sequence[Sequence[Box]]) -> Iterator[Node]:
             run = max(equal_steps(positions, size * ~across), key=len, default=[])
             if SETTINGS.least_row <= len(run) <= SETTINGS.most_row:
                 start, end = positions[run[0]], positions[run[-1]]
-                for drawing in drawings(Box(start, np.eye(3), size)):
-                    yield _translated(drawing, len(run), (end - start) / (len(run) - 1))
+                yield from (_row(each, len(run), end - start) for each in drawings(Box(start, np.eye(3), size)))
 
 
 def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
@@ -184,8 +179,7 @@ def images(nodes: Sequence[Node], surface: FloatArray) -> list[Node]:
 
     def on(image: FloatArray) -> FloatArray:
         """Share of points (C, P, 3) on the surface."""
-        share: FloatArray = np.isfinite(tree.query(image, distance_upper_bound=SETTINGS.image_distance)[0]).mean(1)
-        return share
+        return np.asarray(np.isfinite(tree.query(image, distance_upper_bound=SETTINGS.image_distance)[0]).mean(1))
 
     share = on(points)
     supported = share >= SETTINGS.supported

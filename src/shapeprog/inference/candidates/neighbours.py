@@ -1,9 +1,8 @@
 """Neighbours of a program: variants of its blocks, which are candidates of the next selection.
 
-The first selection is from candidates for single pieces.  A complete program allows further changes: a block ends where
-the next begins, two halves of a board are merged, a missing mirror image is added, and a run gets one more copy.  All
-changes apply to loops and to boxes around drawings; the hints of the statements give the drawing of a changed box.
-Further candidates are boxes around the points that the program does not explain.
+A complete program allows changes that single pieces do not: a block ends where the next begins, two halves of a board
+are merged, a missing mirror image is added, and a run gets one more copy.  All changes apply to loops and to boxes
+around drawings; the hints of the statements give the drawing of a changed box.
 """
 
 from __future__ import annotations

@@ -28,7 +28,6 @@ class Settings:
     wrong: float = 0.5  # distance that has the same misfit as a normal at a right angle
     offset: float = 0.01  # height above the surface of the points: on it, the distance has no gradient
     slack: float = 0.05  # largest excess over the best misfit of a statement with fewer numbers
-    better: float = 2 / 3  # share of its misfit below which the best statement is a candidate too
 
     # Equal candidates
     equal_distance: float = 0.1  # distance below which their surfaces are the same,

@@ -2,8 +2,7 @@
 
 Every statement with a hint is tried on every piece; statements without a hint are tried on the most important pieces,
 with many starts.  The best are fitted to the points of the piece.  Of those with nearly equal misfit, the one with the
-fewest numbers is a candidate, so that copies have the same statement, and the best one where
-its misfit is clearly less.
+fewest numbers is a candidate, so that copies have the same statement.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from shapeprog.space import Array, FloatArray
 
 
 def single_candidates(pieces: Pieces) -> list[Node]:
-    """The simplest drawing statement for every piece with points, in the order of the pieces, and a closer one."""
+    """The simplest drawing statement for every piece with points, in the order of the pieces."""
     points, normals, indices = _target(pieces)
     found = pieces.boxes.take(indices)
     boxes = list(map(Box, found.centre, found.rotation, np.maximum(found.half, THINNEST / 2)))
@@ -54,20 +53,11 @@ def single_candidates(pieces: Pieces) -> list[Node]:
     order = np.flatnonzero(misfit <= best + SETTINGS.slack).tolist()
     order.sort(key=lambda k: (numbers_written(draws[k]), misfit[k]), reverse=True)
     simplest = {int(owner[k]): k for k in order}
-    closest = {int(owner[k]): k for k in order if misfit[k] == best[k]}
-    result: list[Node] = []
-    for piece, k in sorted(simplest.items()):
-        result.append(draws[k])
-        if misfit[closest[piece]] < min(SETTINGS.good, SETTINGS.better * misfit[k]):
-            result.append(draws[closest[piece]])
-    return result
+    return [draws[k] for _, k in sorted(simplest.items())]
 
 
 def fitted(draws: Sequence[Draw], target: Float[Tensor, "B P 3"]) -> list[Draw]:
-    """At least one statement, fitted to points (B, P, 3) by Gauss-Newton steps with a prior on its numbers, in a batch.
-
-    Residuals are distances of the points to the surface; poses are differentiated by central differences.
-    """
+    """Statements, at least one, fitted to points (B, P, 3) by Gauss-Newton steps with a prior on their numbers."""
     code = encode([Program((draw,)) for draw in draws], dtype=torch.float64)
     ids, start = code.ids[:, :, :1], code.parameters[:, 0, 0]  # a drawing is the first step of its block
     values, slots, points = start, start.shape[1], target.shape[1]

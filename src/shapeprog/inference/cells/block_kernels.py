@@ -1,22 +1,8 @@
 """Blocks of the structure search: the row of numbers that stores one, the cells that it covers, and its descent.
 
-A block is a row of 16 whole numbers (as float64): a form, its own numbers, and the loops around it.
-
-=========  ============================================================================================
-slots      hold
-=========  ============================================================================================
-0          FORM: ``BOX``, ``DISC`` or ``BACK``
-1 to 7     FIRST and on, the numbers of the form in the order of its statement, in cells, others unused:
-           BOX   low corner (up, depth, side), extents (up, depth, side)
-           DISC  centre of the bottom (up, depth, side), thickness, radius
-           BACK  low corner, extents, tilt
-8          COUNT1: copies of the first translation loop, 1 for none
-9 to 11    SHIFT1: its step (up, depth, side)
-12         COUNT2: copies of the second translation loop, 1 for none
-13 to 15   SHIFT2: its step
-=========  ============================================================================================
-
-Its cells are bits of words: the lowest bit of a word is the cell at the lowest height, depth and side.
+A block is a row of 16 whole numbers (as float64): a form, the numbers of its statement in cells, in their order, and
+the loops around it.  Its cells are bits of words: the lowest bit of a word is the cell at the lowest height, depth and
+side.
 """
 
 from __future__ import annotations
@@ -31,13 +17,14 @@ from shapeprog.space import BoolArray, FloatArray
 
 WIDTH = 16  # numbers of one block
 
-BOX, DISC, BACK = 0, 1, 2
-
-FORM, FIRST = 0, 1
-EXTENT = FIRST + 3  # extents of a box or back; thickness of a disc
+FORM = 0
+BOX, DISC, BACK = 0, 1, 2  # the forms
+FIRST = 1  # low corner (up, depth, side) of a box or back; centre of the bottom of a disc
+EXTENT = FIRST + 3  # extents (up, depth, side) of a box or back; thickness of a disc
 RADIUS = FIRST + 4  # of a disc
 TILT = FIRST + 6  # of a back
-COUNT1, SHIFT1, COUNT2, SHIFT2 = 8, 9, 12, 13
+COUNT1, COUNT2 = 8, 12  # copies of two translation loops, 1 for none
+SHIFT1, SHIFT2 = 9, 13  # their steps (up, depth, side)
 
 WORDS = 512  # words of 64 cells of the grid; as 1024 of 32, word 32 i + j holds the cells at height i and depth j
 MOST_MOVES = 80  # an upper bound on the number of neighbours of a block

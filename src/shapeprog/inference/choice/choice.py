@@ -27,9 +27,8 @@ def choose(
 ) -> tuple[int, ...]:
     """Indices of the most valuable at most ``blocks`` candidates: greedily, then by ruin and recreate.
 
-    A solid whose interior holds visible points is a local optimum: the greedy step selects it first, and an exchange
-    of a few candidates cannot leave it.  So all points in interiors have a penalty at first.  It falls while the search
-    continues from the best set.  The last of several searches starts from ``start``.
+    The greedy step selects a solid with visible points inside, which an exchange of a few candidates cannot leave.  So
+    all points in interiors have a penalty at first, which falls.  The last of several searches starts from ``start``.
     """
     last = len(table.weights)
     gains = np.bitwise_count(table.rows[:, :last]) @ np.maximum(table.weights, 0) - table.prices

@@ -24,10 +24,8 @@ from shapeprog.language.unroll import unroll
 
 
 def connected(program: Program, coverage: Coverage) -> Program:
-    """A program of one block per node, with floating parts extended to others or removed where little value is lost.
-
-    One block after another is changed or removed, each time to the most valuable program with fewer floating parts.
-    """
+    """A program of one block per node, of which one after another is extended or removed, where little value is lost:
+    each time to the most valuable program with fewer floating parts."""
     while count := sum(lone for _, lone in _loose_parts(program)):
         every = [program, *_options(program)]
         nodes = dict.fromkeys(node for option in every for node in option.body)

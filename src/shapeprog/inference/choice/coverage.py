@@ -35,7 +35,7 @@ from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Node, Program
 from shapeprog.language.unroll import unroll
 from shapeprog.library.length import outside
-from shapeprog.space import DEPTH, HALF, RESOLUTION, SIDE, Array, BoolArray, FloatArray, IntArray
+from shapeprog.space import HALF, RESOLUTION, Array, BoolArray, FloatArray, IntArray
 
 AWAY = 4.0 * HALF  # a coordinate outside all candidates, by which unused samples of a word are known
 
@@ -111,10 +111,10 @@ class Coverage:
         A ``ShapeProgError`` if one draws more copies than :func:`shapeprog.language.unroll` takes.
         """
         programs = [each if isinstance(each, Program) else Program((each,)) for each in candidates]
-        scene = unroll(programs).detach()
+        scene = unroll(programs)
         new = [program for program in dict.fromkeys(programs) if program not in self._index]
         if new or not self._rows:
-            rows = self._rows_of(new, scene if len(new) == len(programs) else unroll(new).detach())
+            rows = self._rows_of(new, scene if len(new) == len(programs) else unroll(new))
             self._rows = list(map(np.concatenate, zip(self._rows, rows, strict=True))) if self._rows else rows
             self._index |= {program: index for index, program in enumerate(new, len(self._index))}
         selected = np.array([self._index[program] for program in programs], np.int64)
@@ -149,16 +149,14 @@ class Coverage:
 
 
 def centred(scene: Scene, candidates: Sequence[Program]) -> IntArray:
-    """Number of axes (B,) along which a candidate is centred, left to right or in depth; each saves one number.
-
-    The position of a centred part follows from its size.  Mirrored and rotated candidates save none, nor does a pair
-    along an axis, which is a mirror.
-    """
+    """Number of axes (B,) along which a candidate is centred, left to right or in depth; each saves one number, as the
+    position follows from the size.  Mirrored and rotated candidates save none, nor do pairs along the axis."""
     share = (scene.mask / scene.mask.sum(1, keepdim=True).clamp(min=1)).numpy()
     middle = np.einsum("bn,bni->bi", share, scene.centre.numpy())
-    around = [[any(_around(node, axis) for node in program.walk()) for axis in (DEPTH, SIDE)] for program in candidates]
-    near = np.abs(middle[:, [DEPTH, SIDE]]) < SETTINGS.even
-    return np.sum(near & ~np.reshape(around, near.shape).astype(np.bool_), 1)
+    saving = (np.abs(middle) < SETTINGS.even) & [False, True, True]
+    for row, axis in np.argwhere(saving).tolist():
+        saving[row, axis] = not any(_around(node, axis) for node in candidates[row].walk())
+    return saving.sum(1)
 
 
 def _around(node: Node, axis: int) -> bool:
@@ -167,20 +165,14 @@ def _around(node: Node, axis: int) -> bool:
 
 
 def square(scene: Scene) -> BoolArray:
-    """Whether the first primitive of a candidate (B,) is a bar of square section, whose sides will be one number.
-
-    Without this, a round bar is cheaper than a square one.
-    """
+    """Whether the first primitive of a candidate (B,) is a bar of square section, whose sides will be one number."""
     sides = np.sort(2 * scene.bounds[:, :1].numpy(), 2)
     bars = (scene.kind[:, :1].numpy() == KINDS["cuboid"]) & (sides[..., 1] - sides[..., 0] < SETTINGS.even)
     return np.any(bars, 1)
 
 
 def protrusion(scene: Scene, evidence: Evidence) -> FloatArray:
-    """How far the middle of a face of each candidate (B,) is outside the box around the surface.
-
-    The corners of a slanted leg may dip below the floor.
-    """
+    """How far the middle of a face of each candidate (B,) is outside the box around the surface; corners may be."""
     centre, reach = scene.centre.numpy(), (scene.rotation.abs() * scene.bounds[..., None, :]).amax(-1).numpy()
     low, high = evidence.surface.min(0), evidence.surface.max(0)
     beyond = np.maximum(low - (centre - reach), centre + reach - high).max(2)
@@ -222,11 +214,8 @@ def unsupported(scene: Scene, evidence: Evidence, binned: BinnedPoints) -> tuple
 
 
 def shares(samples: FloatArray, normals: FloatArray, evidence: Evidence, binned: BinnedPoints) -> FloatArray:
-    """Share of the price of unsupported surface that each sample (S, 3) pays; ``binned`` is the surface of the target.
-
-    It is zero where a point of the target within reach has a normal that agrees, ``TURNED`` where an outward normal
-    faces the other way, such as behind the wall of a solid, and one elsewhere.
-    """
+    """Share of the price of unsupported surface that each sample (S, 3) pays, see :func:`charged`; ``binned`` is the
+    surface of the target."""
     share, outward = np.zeros(len(samples)), evidence.surface_outward[binned.order]
     points, sides, _, starts = binned
     data = samples, normals, points, sides, outward, starts, evidence.reach, evidence.agreement, share

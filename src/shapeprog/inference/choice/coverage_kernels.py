@@ -105,10 +105,8 @@ def share_of(x, y, z, side, points, normals, outward, starts, reach, agreement):
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[::1], i8[::1], f8, f8, f8[::1], i8, i8)")
 def charged(samples, sides, points, normals, outward, starts, reach, agreement, share, begin, end):
-    """Write the share of its price that each sample pays: zero with a point within reach whose normal agrees.
-
-    Zero normals agree with all.  Where a normal points outwards, a sample that faces the other way pays ``TURNED``.
-    """
+    """Write the share of its price that each sample pays: zero where a point within reach has a normal that agrees, as
+    zero normals do; ``TURNED`` where one faces the other way, such as behind the wall of a solid; else one."""
     for k in range(begin, end):
         x, y, z = samples[k, 0], samples[k, 1], samples[k, 2]
         share[k] = share_of(x, y, z, sides[k], points, normals, outward, starts, reach, agreement)

@@ -1,18 +1,14 @@
 """Adjustment: all continuous numbers of a program together, so that its surface lies on that of a target.
 
-A few steps of Gauss and Newton through the renderer.  Residuals are distances along normals, joints between parts are
-kept closed, and every number has a weak prior at its start: numbers that the target does not determine, such as the
-thickness behind a sheet, do not change.
+Residuals of a few steps of Gauss and Newton are distances along normals, joints between parts are kept closed, and
+numbers that the target does not determine, such as the thickness behind a sheet, are held by a weak prior.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import torch
-from jaxtyping import Bool, Float
-from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.arrays import one_tensor_thread
@@ -53,8 +49,7 @@ def adjust(
 ) -> Program:
     """The same program with numbers that fit the evidence, tidy: hundredths of cells, tenths of degrees.
 
-    No number changes by more than ``reach``.  In the last ``FIT.last`` steps of Gauss and Newton angles are fixed.  The
-    seed is that of the samples that each step draws.
+    No number changes by more than ``reach``.  The seed is that of the samples that each step draws.
     """
     if not program.size:
         return program
@@ -63,6 +58,8 @@ def adjust(
     generator, target, angles = torch.Generator().manual_seed(seed), Target(evidence), tunable.are("angle")
     narrow = FIT.explained * evidence.tolerance
     wide = max(1.2, narrow)  # in cells, at first
+    weights = torch.where(tunable.are("length") | angles, FIT.measure_prior, FIT.place_prior).double()
+    prior, farthest = weights * tunable.scale**2, 0.7 / tunable.scale  # a step moves the surface by up to .7 cells
     # The lowest points of scans are noise: the floor is a tolerance above them.
     floor = float(evidence.surface[:, 0].min()) + evidence.tolerance * (evidence.tolerance > SURFACE.tolerance)
     with one_tensor_thread(kernels=1):
@@ -79,18 +76,19 @@ def adjust(
             joints = moved(poses.scene, joints)
             pairs = target.pairs(poses.scene, generator)
             systems = of_target(poses, pairs, wide ** (1 - done) * narrow**done), of_joints(poses, joints, closing)
-            values = (values + _move(systems, tunable, values, ~(angles & closing))).clamp(low, high)
+            slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
+            slope, curvature = slope + prior * (values - tunable.values), curvature + torch.diag(prior)
+            move, free = torch.zeros_like(values), ~(angles & closing)
+            move[free] = -torch.linalg.solve(curvature[free][:, free], slope[free])
+            values = (values + move.clamp(-farthest, farthest)).clamp(low, high)
             if progress:
                 progress("adjusting", (step + 1) / steps)
     return tunable.settled(values)
 
 
 def of_joints(poses: Poses, joints: Joints, closing: bool) -> System:
-    """The part of gaps, whose weight falls where the target opens them: it stretches a leg, but does not lift a seat.
-
-    At the end the gaps up to a cell that would divide the program are closed, and feet up to .15 cells above the floor
-    are put on it.
-    """
+    """The part of gaps, whose weight falls where the target opens them; if closing, gaps up to a cell that would divide
+    the program are closed, and feet up to .15 cells above the floor are put on it."""
     residual, slopes = needs(poses, joints)
     weight = 0.003 * (FIT.nearly**2 / (FIT.nearly**2 + residual**2)) ** 2
     if closing:
@@ -100,18 +98,3 @@ def of_joints(poses: Poses, joints: Joints, closing: bool) -> System:
         weight = torch.where(needed, 0.03, weight)
     weighted = weight[:, None] * slopes
     return weighted.T @ residual, weighted.T @ slopes
-
-
-def _move(
-    systems: Sequence[System], tunable: Tunable, values: Float[Tensor, " F"], free: Bool[Tensor, " F"]
-) -> Float[Tensor, " F"]:
-    """The step to the minimum of the sum of squares, with the prior of every number at its start; only some move."""
-    slope, curvature = (sum(parts) for parts in zip(*systems, strict=True))
-    measures = tunable.are("length") | tunable.are("angle")
-    prior = torch.where(measures, FIT.measure_prior, FIT.place_prior).double() * tunable.scale**2
-    slope = slope + prior * (values - tunable.values)
-    curvature = curvature + torch.diag(prior)
-    move = torch.zeros_like(values)
-    move[free] = -torch.linalg.solve(curvature[free][:, free], slope[free])
-    farthest = 0.7 / tunable.scale  # so far, in cells, one number may move the surface in a step
-    return move.clamp(-farthest, farthest)

@@ -35,8 +35,8 @@ class Joints(NamedTuple):
 
 def find_joints(scene: Scene, floor: float) -> Joints:
     """The joints of a scene: of parts that touch, and of those that nearly touch where nothing else joins them."""
-    count = len(scene.mask)
-    low, high = scene.centre - scene.reach, scene.centre + scene.reach
+    count, reach = len(scene.mask), scene.reach
+    low, high = scene.centre - reach, scene.centre + reach
     start, end = torch.maximum(low[:, None], low), torch.minimum(high[:, None], high)  # of what both boxes contain
     pairs = ((start - end).amax(-1) < 1.0).triu(1).nonzero()
     volume = scene.bounds.prod(-1)[pairs]

@@ -80,10 +80,8 @@ def faces_of(scene: Scene, mesh: Components) -> Faces:
 
 
 def _plane(face: float, heights: FloatArray, shared: FloatArray, total: float) -> tuple[float, float]:
-    """The coordinate of the plane of a face, and how much of it this covers; its own and zero if it has no plane.
-
-    Triangles at these heights (T,), in order, share so much area (T,) with the face, whose area is ``total``.
-    """
+    """The coordinate of the plane of a face of area ``total``, and how much of it this covers; its own and zero if it
+    has none.  Triangles at these heights (T,), in order, share so much area (T,) with the face."""
     heights, shared = heights[shared > 0], shared[shared > 0]
     first = np.flatnonzero(np.diff(heights, prepend=-np.inf) > FIT.plane_step)
     if not len(first):

@@ -69,8 +69,7 @@ class Target:
     def pairs(self, scene: Scene, generator: torch.Generator) -> Pairs:
         """Pairs both ways, drawn at random: from points to the program, and from its surface to points.
 
-        Plain distances of points to the union have little weight: they alone determine how far a part reaches along a
-        sheet that has no edges.
+        Plain distances of points have little weight: they alone fix how far a part reaches along an endless sheet.
         """
         evidence, count = self.evidence, FIT.pairs
         sample = sample_surface(scene, count, generator)
@@ -109,11 +108,8 @@ class Target:
     def _closest(
         self, points: IntArray, samples: IntArray, places: FloatArray, facing: FloatArray
     ) -> tuple[IntArray, IntArray, FloatArray]:
-        """The best of several pairs (R, k) of points and samples, of which one may be the same for all, and its squared
-        penalty besides the distance along the normal.
-
-        The samples are at ``places`` (S, 3) and ``facing`` (S, 3) that way.
-        """
+        """The best of pairs (R, k) of points and of samples, at ``places`` (S, 3) and ``facing`` (S, 3) that way, and
+        its squared penalty besides the distance along the normal.  One of a pair may be the same for all."""
         evidence = self.evidence
         normals, sides = evidence.normals.take(points, 0), facing.take(samples, 0)
         away = evidence.points.take(points, 0) - places.take(samples, 0)

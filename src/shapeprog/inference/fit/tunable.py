@@ -40,9 +40,8 @@ class Poses(NamedTuple):
 class Tunable:
     """The numbers of a program that may move, as a vector (F,), and the way from such a vector to its primitives.
 
-    Counts, turns and axes stay, and so do steps of a full turn and exact zeros of a shift or of the plane of a mirror:
-    the loop along an axis keeps to it, the symmetric object stays symmetric.  A loop around several statements has its
-    numbers once.
+    Counts, turns and axes stay, and so do steps of a full turn and exact zeros of loops: a run keeps to its axis, and a
+    mirror to the middle.  A loop around several statements has its numbers once.
     """
 
     def __init__(self, program: Program) -> None:

@@ -87,11 +87,8 @@ def near(boxes: Boxes, points: FloatArray, distance: float) -> tuple[BoolArray, 
 
 
 def find_pieces(evidence: Evidence) -> Pieces:
-    """Pieces of a mesh or a point cloud.
-
-    Pieces of a greedy selection are first, then components, then groups, rods and limbs, then slabs and sheets; within
-    each class, pieces that explain more points are first.
-    """
+    """Pieces of a mesh or a point cloud: those of a greedy selection, then components, then groups, rods and limbs,
+    then slabs and sheets; within each class, pieces that explain more points are first."""
     if evidence.mesh is not None:
         cloud, parts = _of_mesh(evidence.mesh, evidence.boxes)
     else:
@@ -104,11 +101,10 @@ def find_pieces(evidence: Evidence) -> Pieces:
     unique = np.union1d(np.flatnonzero(source == Source.COMPONENT), distinct(boxes))  # each once but for components
     boxes, source = boxes.take(unique), source[unique]
     support = Support(cloud, boxes)
-    cover, first = support.cover(), np.full(len(unique), len(unique))
-    first[cover] = np.arange(len(cover))
     turn = np.searchsorted([Source.COMPONENT, Source.LIMB], source)
     value = support.explained.sum(1) - support.price
-    order = np.lexsort((-np.round(value, 6), turn, first))[: SETTINGS.pieces]
+    ranked = np.lexsort((-np.round(value, 6), turn))
+    order = np.array([*dict.fromkeys([*support.cover(), *ranked])], np.int64)[: SETTINGS.pieces]
     return Pieces(boxes.take(order), source[order], cloud)
 
 

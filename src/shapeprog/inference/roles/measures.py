@@ -30,8 +30,9 @@ class Parts:
     def __init__(self, scene: Scene, turns: int = 0) -> None:
         self.turns, scene = turns, scene[scene.mask]
         half = scene.bounds.double().numpy()
-        centre, pose = turned(scene.centre.double().numpy(), turns), turned(scene.rotation.double().mT.numpy(), turns)
-        pose = np.swapaxes(pose, -1, -2)
+        quarter = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # from depth to side
+        turn = np.linalg.matrix_power(quarter, turns)
+        centre, pose = scene.centre.double().numpy() @ turn.T, turn @ scene.rotation.double().numpy()
         self.block = scene.block.numpy()  # the block that drew each part
         self.count = len(half)
         reach = (np.abs(pose) @ half[..., None])[..., 0]
@@ -156,10 +157,3 @@ class Parts:
         broad_frontways = ~self.slender | (self.upright & (self.side >= self.size[SIDE] / 2))
         large = (self.up >= 0.1 * self.size[UP]) & (self.side >= 0.12 * self.size[SIDE]) & self.cased
         self.front: Mask = self.frontal & (broad_frontways | large)
-
-
-def turned(vectors: FloatArray, turns: int) -> FloatArray:
-    """Vectors (..., 3) in a frame turned by so many quarters about up."""
-    for _ in range(turns % 4):
-        vectors = vectors[..., [UP, SIDE, DEPTH]] * [1, 1, -1]
-    return vectors

@@ -1,8 +1,7 @@
 """A surface as points with normals and nearest neighbours.
 
-Points of a clean scan lie on planes with their nearest neighbours wherever the surface is flat; more points resolve
-thin parts and edges better.  In a noisy scan, points closer to each other than the noise give no direction, so fewer
-points are better.
+In a clean scan, more points resolve thin parts and edges better.  In a noisy one, points closer to each other than the
+noise give no direction, so fewer are better.
 """
 
 from __future__ import annotations

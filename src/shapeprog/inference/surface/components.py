@@ -93,11 +93,8 @@ def _edges(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
 
 
 def solid_sides(mesh: Components, volume: FloatArray) -> IntArray:
-    """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others.
-
-    The signed volume, see :func:`enclosed`, is positive if the faces point outwards.  The solid is at least .2 cells
-    thick on average: the sign of the volume of a crumpled sheet is random.
-    """
+    """For each face (F,) of a component that bounds a solid, 1 if it faces outwards and -1 if inwards; 0 for others,
+    and for those less than .2 cells thick on average: the sign of the volume of a crumpled sheet is random."""
     # NaN, of open components, compares false.
     sign = np.where(2 * np.abs(volume) > 0.2 * mesh.area, np.sign(volume), 0).astype(np.int64)
     return np.repeat(sign, np.diff(mesh.start))

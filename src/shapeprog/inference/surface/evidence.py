@@ -183,8 +183,7 @@ def points_of_cells(voxels: BoolArray, count: int = 5000) -> npt.NDArray[np.floa
 
 
 def _exposed_faces(voxels: BoolArray) -> tuple[FloatArray, IntArray, BoolArray]:
-    """The normal (F, 3) of each exposed face of cells, its cell (F, 3), and whether it is at an end of a longest side
-    (F,)."""
+    """Normals (F, 3) of exposed faces of cells, their cells (F, 3), and which (F,) are at an end of a longest side."""
     padded, occupied = np.pad(voxels, 1), np.argwhere(voxels)
     sides = [[voxels & ~np.roll(padded, by, axis)[1:-1, 1:-1, 1:-1] for by in (1, -1)] for axis in range(3)]
     axis, above, *cell = np.argwhere(sides).T
@@ -209,11 +208,8 @@ def _visible(points: FloatArray, normals: FloatArray, barrier: BoolArray, solid:
 
 
 def _turned_outward(normals: FloatArray, front: BoolArray, back: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """Normals (P, 3) turned outwards, and whether their orientation is known (P,).
-
-    It is known where only the front or only the back of a point is free.  It is known everywhere, thin parts included,
-    if nearly all such normals agree, as in a mesh with consistent winding.
-    """
+    """Normals (P, 3) turned outwards, and whether their orientation is known (P,): where only the front or only the
+    back of a point is free, or everywhere if nearly all such normals agree, as in a mesh with consistent winding."""
     oriented = front != back
     share = float(front[oriented].mean()) if oriented.any() else 0.5
     if max(share, 1 - share) >= 0.95:
@@ -255,9 +251,5 @@ def doubt_of_furniture(evidence: Evidence) -> str:
     covered = np.count_nonzero(np.bincount(plan[level])) / np.count_nonzero(np.bincount(plan))
     along = float((normals.max(1) > math.cos(math.radians(10))).mean())
     # Less is true of mugs, bottles, cars and figures, and of 2 % of furniture (val), all of it wire or shells.
-    if covered >= 0.35 or along >= 0.45:
-        return ""
-    return (
-        f"This does not look like furniture: {along:.0%} of its surface faces along an axis, and level surfaces cover "
-        f"{covered:.0%} of its plan."
-    )
+    why = f"{along:.0%} of its surface faces along an axis, and level surfaces cover {covered:.0%} of its plan"
+    return "" if covered >= 0.35 or along >= 0.45 else f"This does not look like furniture: {why}."

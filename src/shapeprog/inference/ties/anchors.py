@@ -37,14 +37,19 @@ class _AxisAnchors:
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in self.elements]
-        # Both ends of a rod, with the cost of different anchors, or, of mirror images, of those at the sides
-        self.spans: list[tuple[int, int, float]] = []
-        self.images: list[tuple[int, int, float]] = []
+        # Ends of rods, with the cost of different anchors; those of a symmetric rod mirror the choice of its start.
+        self.spans: dict[tuple[int, int], float] = {}
+        self.chosen_by = np.arange(len(self.elements))
         for (line, key), end in index.items():
             if key in ("end", "through"):
-                self._add_span(index[line, "start"], end)
-        symmetric = {start for start, _, _ in self.images}
-        self.spans = [span for span in self.spans if span[0] not in symmetric]
+                pair = index[line, "start"], end
+                left, right = sorted(pair, key=lambda k: self.elements[k].low)
+                low, high = self.elements[left].low, self.elements[right].low
+                if axis < 2 and abs(low + high - self.extent) < 2 * TIES.off_middle * self.extent:
+                    self.choices[left], self.choices[right] = ([(MIDDLE,), (side,)] for side in (LOW, HIGH))
+                    self.spans = {other: cost for other, cost in self.spans.items() if pair[0] not in other}
+                    self.chosen_by[end] = pair[0]
+                self.spans[pair] = TIES.resized * max(0.0, 1 - (high - low) / (TIES.spanning * self.extent))
         count, most = len(self.elements), max(map(len, self.choices), default=1)
         self.costs = np.full((count, most), np.inf)
         # By which share of the growth of the whole low and high ends move.
@@ -59,9 +64,8 @@ class _AxisAnchors:
                 moves[2 * k + 1 : 2 * k + 3, layout.index[element.line, AXES[axis].size]] = -1, 1
             if element.key != "across":
                 moves[2 * k + 1, layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")]] = 1
-        self.chosen_by = np.arange(count)  # both ends of a symmetric rod have mirrored anchors: those of its start
-        for one, other, penalty in self.images:
-            self.costs[one, :2], self.costs[other, :2], self.chosen_by[other] = (0.0, penalty), 0.0, one
+        images = np.flatnonzero(self.chosen_by != np.arange(count))
+        self.costs[np.append(images, self.chosen_by[images]), :2] = 0.0
         # What the boxes follow from (Q = 2 + 2 K): from one, which gives them at the start, from growth of the whole
         # while all coordinates stay, as mirror images move with its high side, and from moves of the ends of elements.
         moved = (layout.values(layout.numbers + way * moves) for way in (-STEP, STEP))
@@ -93,28 +97,14 @@ class _AxisAnchors:
     def _choices(self, element: Element) -> Sequence[Anchors]:
         off = max(TIES.off_middle * self.extent, TIES.within * (element.kind != "interval"))
         centred = abs(element.middle - self.extent / 2) < off and self.axis < 2
+        middle = [MIDDLE] if self.axis < 2 or element.key == "plane" else []
         if element.kind != "interval":
-            if self.axis == 2 and element.key != "plane":
-                return [(LOW,), (HIGH,)]
             # Ends of rods near the middle may still go with a side, where the parts that they join do.
             only_middle = centred and element.key not in ("last", *POINTS)
-            return [(MIDDLE,)] if only_middle else [(LOW,), (MIDDLE,), (HIGH,)]
-        if centred:
-            return [(LOW, HIGH), (MIDDLE, MIDDLE)]
+            return [(MIDDLE,)] if only_middle else [(anchor,) for anchor in (LOW, *middle, HIGH)]
         # No part has one face at a side and one at the middle: that is almost never chosen.
-        pairs = [(LOW, LOW), (LOW, HIGH), (HIGH, HIGH)]
-        return pairs + ([(MIDDLE, MIDDLE)] if self.axis < 2 else [])
-
-    def _add_span(self, start: int, end: int) -> None:
-        """Both ends of a rod; if they are at equal distances from the middle they stay so."""
-        ends, wide = [self.elements[k].low for k in (start, end)], TIES.spanning * self.extent
-        span = start, end, TIES.resized * max(0.0, 1 - abs(ends[0] - ends[1]) / wide)
-        if self.axis < 2 and abs(sum(ends) - self.extent) < 2 * TIES.off_middle * self.extent:
-            sides = (LOW, HIGH) if ends[0] < ends[1] else (HIGH, LOW)
-            self.choices[start], self.choices[end] = ([(MIDDLE,), (side,)] for side in sides)
-            self.images.append(span)
-        else:
-            self.spans.append(span)
+        one_sided = [] if centred else [(LOW, LOW), (HIGH, HIGH)]
+        return [(LOW, HIGH), *one_sided, *((anchor, anchor) for anchor in middle)]
 
     def _unary(self, element: Element, anchors: Anchors) -> float:
         extent = self.extent
@@ -139,11 +129,10 @@ class _AxisAnchors:
 
     def solved(self) -> list[Anchors]:
         """The anchors of every element."""
-        # From one side, or where that is no choice in the first way; and each end from the nearer side.
-        one_sided = [(self.shifts == side / HIGH).all(2).argmax(1) for side in (LOW, HIGH)]
+        # The cheapest choices, those nearest to either side, and each end from the nearer side.
         high = np.array([(each.low, each.high) for each in self.elements]).reshape(-1, 1, 2) > self.extent / 2
-        nearer = np.nan_to_num(np.abs(self.shifts - high), nan=np.inf).sum(2).argmin(1)
-        starts = [self.costs.argmin(1), *one_sided, nearer]
+        away = (np.nan_to_num(np.abs(self.shifts - side), nan=np.inf).sum(2) for side in (0, 1, high))
+        starts = [scores.argmin(1) for scores in (self.costs, *away)]
         _, best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
         # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
         if len(self.leaning) and self._costs(best[None], exact=True) >= TIES.separated:
@@ -152,30 +141,22 @@ class _AxisAnchors:
 
     def _descent(self, state: Array, *, exact: bool = False) -> tuple[float, Array]:
         """The cost and state (K,) from which no change of an element is cheaper."""
-        total, (count, most) = float(self._costs(state[None], exact=exact)[0]), self.costs.shape
-        for _ in range(8):
-            before, k = state, 0
-            while k < count:  # from here on the next element that is cheaper with another choice
-                ahead = min(TIES.ahead, count - k)
-                trials = np.tile(state, (ahead, most, 1))
-                trials[np.arange(ahead), :, np.arange(k, k + ahead)] = np.arange(most)
-                costs = self._costs(trials.reshape(-1, count), exact=exact).reshape(-1, most)
-                cheaper = costs.min(1) < total - 1e-9
-                if not cheaper.any():
-                    k += ahead
-                    continue
-                first = int(cheaper.argmax())
-                state, total = trials[first, costs[first].argmin()], float(costs[first].min())
-                k += first + 1
-            if state is before:
-                break
+        total, before, (count, most) = np.inf, None, self.costs.shape
+        while total != before:
+            before = total
+            for k in range(count):
+                trials = np.tile(state, (most, 1))
+                trials[:, k] = np.arange(most)
+                costs = self._costs(trials, exact=exact)
+                if costs.min() < total - 1e-9:
+                    state, total = trials[costs.argmin()], float(costs.min())
         return total, state
 
     def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K); for ``exact`` see :meth:`_gaps`."""
         states, elements, growth = states[:, self.chosen_by], np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
-        for start, end, penalty in self.spans:
+        for (start, end), penalty in self.spans.items():
             cost += penalty * (shifts[:, start, 0] != shifts[:, end, 0])
         for last, first in self.rows.items():  # a row gives a side or the middle of its last copy
             shifts[:, last] -= shifts[:, last, :1] * (shifts[:, first, 1:] - shifts[:, first, :1])

@@ -43,9 +43,9 @@ def solved(slots: list[Slot], rows: FloatArray) -> Solution:
     """The free ones of numbers (P,) for which the text is short, where relations (M, P) hold: the products of these
     independent rows with the numbers are zero."""
 
-    def order(k: int) -> tuple[int, bool, int, int]:
+    def order(k: int) -> tuple[int, bool, int]:
         slot = slots[k]
-        return ELIMINATED[slot.kind], not slot.word.startswith(("last", "end", "through")), -slot.line, -k
+        return ELIMINATED[slot.kind], not slot.word.startswith(("last", "end", "through")), -k
 
     dependent = independent(rows.T, sorted(range(len(slots)), key=order))
     free = sorted({*range(len(slots))} - {*dependent}, key=order)
@@ -87,66 +87,39 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
 def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[Solution, FloatArray]:
     """The numbers (P,) of a program as expressions of other free ones, so that fewer parts are separated when a shared
     one changes: at most one is measured from each; and the values of these (Z,)."""
-    contacts, free = _Contacts(layout, numbers), solution.free
-    factors, values = solution.factors.copy(), numbers[free]
-    several = np.flatnonzero(np.count_nonzero(factors, axis=0) > 1).tolist()
-    shared = [z for z in several if layout.slots[free[z]].kind not in ("extent", "angle")]
-    changes = contacts.after((factors * values).T[shared])
-    for n, z in enumerate(shared):
-        cost, lost = changes[n]
-        ways = [*product(_carriable(factors, free, layout, lost, z), (1.0, -1.0))] if cost else []
-        others = contacts.after(np.array([(factors[:, z] + way * factors[:, y]) * values[z] for y, way in ways]))
-        least, best = min(((more, index) for index, (more, _) in enumerate(others)), default=(cost, 0))
-        if least < cost:
-            y, way = ways[best]
-            factors[:, z] += way * factors[:, y]
-            values[y] -= way * values[z]
-            changes = contacts.after((factors * values).T[shared])
+    free, pairs = solution.free, np.stack(touching(boxes_of(layout.scene(numbers)), TIES.touch), 1)
+    factors, values, unchanged = solution.factors.copy(), numbers[free], np.zeros((1, len(numbers)))
+    together = _pieces(layout, numbers, pairs, unchanged)
+    for z in np.flatnonzero(np.count_nonzero(factors, axis=0) > 1).tolist():
+        fixed = layout.slots[free[z]].kind in ("extent", "angle")
+        if fixed or _pieces(layout, numbers, pairs, factors.T[[z]] * values[z]) == together:
+            continue
+        ways = [(z, 0.0), *product(_carriable(factors, free, layout, z), (1.0, -1.0))]
+        columns = np.array([factors[:, z] + way * factors[:, y] for y, way in ways])
+        y, way = ways[np.argmin(_pieces(layout, numbers, pairs, columns * values[z]))]
+        factors[:, z] += way * factors[:, y]
+        values[y] -= way * values[z]
     return Solution(factors, free), values
 
 
-def _carriable(factors: FloatArray, free: list[int], layout: Layout, lost: set[int], z: int) -> list[int]:
-    """Free distances that alone move one of these lines along an axis along which another free number moves parts."""
-    slots = layout.slots
-    lines = {around for line in lost for around in (line, *layout.loops_around[line])}
-    axes = {slots[p].axis for p in np.flatnonzero(factors[:, z])} - {-1}
-    result = set()
-    for p, slot in enumerate(slots):
-        used = np.flatnonzero(factors[p])
-        if slot.line in lines and slot.axis in axes and len(used) == 1 and used[0] != z:
-            rows = factors[factors[:, used[0]] != 0]
-            if (rows == rows[0]).all() and slots[free[used[0]]].kind in DISTANCES:
-                result.add(int(used[0]))
-    return sorted(result)
+def _carriable(factors: FloatArray, free: list[int], layout: Layout, z: int) -> list[int]:
+    """Free distances along an axis along which another free number moves parts, from which nothing follows but equal
+    ones."""
+    slots, unit = layout.slots, np.eye(len(free))
+    axes = {slots[p].axis for p in np.flatnonzero(factors[:, z])}
+    distances = [y for y, k in enumerate(free) if slots[k].kind in DISTANCES and slots[k].axis in axes and y != z]
+    return [y for y in distances if (factors[factors[:, y] != 0] == unit[y]).all()]
 
 
-class _Contacts:
-    """Which parts of a program touch, and how many of them come apart when its numbers change."""
-
-    def __init__(self, layout: Layout, numbers: FloatArray) -> None:
-        self.layout, self.numbers = layout, numbers
-        scene = layout.scene(numbers)
-        self.line = np.array(layout.parts)[scene.block.numpy()]
-        self.pairs = np.stack(touching(boxes_of(scene), TIES.touch), 1)
-        self.pieces = self._pieces(np.ones((1, len(self.pairs)), bool))
-
-    def after(self, parts: FloatArray) -> list[tuple[int, set[int]]]:
-        """For parts (S, P) of the numbers, each of which a name multiplies: how many more pieces there are when that
-        changes, and the lines that lose contacts."""
-        if not len(parts):
-            return []
-        changes = np.multiply.outer(parts, np.subtract(TIES.changes, 1)).swapaxes(1, 2)  # (S, 2, P)
-        changed = self.layout.values(self.numbers + changes.reshape(-1, changes.shape[-1]))
-        # One batch of all might have more primitives than ``unroll`` takes.
-        scenes = map(self.layout.tunable.scenes, changed.split(TIES.changed))
-        kept = np.concatenate([gaps(boxes_of(scene), *self.pairs.T) for scene in scenes]) < TIES.touch
-        more = (self._pieces(kept) - self.pieces).reshape(len(parts), -1).sum(1).tolist()
-        lost = np.any(~kept.reshape(*changes.shape[:2], -1), 1)
-        lines = self.line[self.pairs]
-        return [(count, {*lines[of].ravel().tolist()}) for count, of in zip(more, lost, strict=True)]
-
-    def _pieces(self, kept: Array) -> Array:
-        """The numbers (S,) of pieces that contacts (S, C) leave."""
-        count, (scene, pair) = len(self.line), np.nonzero(kept)
-        labels = linked(count * scene[:, None] + self.pairs[pair], count * len(kept)).reshape(len(kept), count)
-        return np.ptp(labels, axis=1) + 1  # those of one scene are numbered after those of another
+def _pieces(layout: Layout, numbers: FloatArray, pairs: Array, parts: FloatArray) -> list[int]:
+    """How many pieces the contacts of pairs of primitives (C, 2) leave of a program with these numbers (P,), in all,
+    when a name is changed in two ways that multiplies such parts of them; for each of several parts (S, P)."""
+    changed = numbers + np.multiply.outer(parts, np.subtract(TIES.changes, 1)).swapaxes(1, 2)  # (S, 2, P)
+    # One batch of all might have more primitives than ``unroll`` takes.
+    batches = layout.values(changed.reshape(-1, len(numbers))).split(TIES.changed)
+    boxes = [boxes_of(layout.tunable.scenes(batch)) for batch in batches]
+    scene, pair = np.nonzero(np.concatenate([gaps(each, *pairs.T) for each in boxes]) < TIES.touch)
+    count, scenes = boxes[0].centre.shape[1], changed.size // len(numbers)
+    labels = linked(count * scene[:, None] + pairs[pair], count * scenes).reshape(len(parts), -1)
+    pieces: list[int] = (np.ptp(labels, axis=1) + 1).tolist()  # those of one scene are numbered after those of another
+    return pieces

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import TypeGuard
 
 import numpy as np
 
@@ -26,9 +25,8 @@ def simplified(line: Line, numbers: dict[str, float]) -> Line:
     """The line without keywords of zero, and of points, that change nothing that it draws, given the values of all
     names; a taper with equal radii is a rod."""
     if isinstance(line, Part | Group):
-        drawn = _drawn(line, numbers)
         for keywords in _shorter(line.keywords):
-            if _same(drawn, _drawn(shorter := replace(line, keywords=keywords), numbers)):
+            if _same(line, shorter := replace(line, keywords=keywords), numbers):
                 return simplified(shorter, numbers)
         radius = dict(line.keywords).get("radius")
         if line.kind == "taper" and isinstance(radius, tuple) and radius[0] == radius[1]:
@@ -48,60 +46,46 @@ def _shorter(keywords: Keywords) -> Iterator[Keywords]:
             yield (*before, *behind)
 
 
-def _has_box(line: Line) -> TypeGuard[Part | Group]:
-    """Whether a line has a box and draws in it: a part, or a division, whose part has no other box."""
-    return isinstance(line, Part) or (isinstance(line, Group) and line.kind == "divide")
-
-
 def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...]:
     """Parts and loops, given the values of all names: merged, and in boxes with the clearances that they share where
     that saves words."""
-    lines = merged_lines(lines)
-    while True:
+    lines, saved = merged_lines(lines), 1
+    while saved:
         sides = {line: _sides(line) for line in lines if not isinstance(line, Group) or line.kind != "inside"}
         frames = {one & other for one, other in combinations(sides.values(), 2)} - {frozenset()}
-        drawn = {line: _drawn(line, numbers) for line, own in sides.items() if own and frames}
-        best, saved = lines, 0
+        options = [(0, lines)]
         for frame in sorted((tuple(sorted(frame, key=lambda side: BOX.index(side[0]))) for frame in frames), key=str):
-            moved = changed_lines(sides, partial(_inside, frame=frame))
-            inner = dict(zip(sides, moved, strict=True))
-            members = [
-                line for line in sides
-                if line != inner[line] and _same(drawn[line], _drawn(Group("inside", frame, (inner[line],)), numbers))
-            ]  # fmt: skip
+            moved = changed_lines(sides, partial(_inside, frame=frame, numbers=numbers))
+            inner = {line: new for line, new in zip(sides, moved, strict=True) if new != line}
+            members = [line for line, new in inner.items() if _same(line, Group("inside", frame, (new,)), numbers)]
             box = Group("inside", frame, tuple(inner[line] for line in members))
-            words = sum(map(_words, members)) - _words(box) - 2
-            if len(members) > 1 and words > saved:
-                saved, first = words, members[0]
-                best = tuple(box if line == first else line for line in lines if line == first or line not in members)
-        if not saved:
-            return lines
-        lines = best
+            instead = tuple(box if line in members[:1] else line for line in lines if line not in members[1:])
+            options.append((sum(map(_words, members)) - _words(box) - 2, instead))
+        saved, lines = max(options, key=lambda option: option[0])
+    return lines
 
 
 def _sides(line: Line) -> frozenset[tuple[str, Argument]]:
-    """The named clearances of the parts in a line, with their keywords."""
+    """The named clearances in a line, with their keywords."""
     words = {word for words in AXES for word in words[:2]}
-    pairs = (pair for inner in Source((line,)).walk() if _has_box(inner) for pair in inner.keywords)
-    return frozenset(pair for pair in pairs if pair[0] in words and isinstance(pair[1], Expression))
+    return frozenset(pair for pair in _keywords(line) if pair[0] in words and isinstance(pair[1], Expression))
 
 
-def _inside(line: Line, frame: Keywords) -> Line:
-    """A part or division as it is written in a box with these clearances: without them, or with 0 where its size needs
-    a side to start from."""
-    if not _has_box(line):
-        return line
-    needed = {word for words in AXES if words.size in dict(line.keywords) for word in words} - {"bottom"}
-    return replace(line, keywords=tuple(
-        (word, 0.0 if (word, value) in frame else value)
-        for word, value in line.keywords if (word, value) not in frame or word in needed
-    ))  # fmt: skip
+def _keywords(line: Line) -> Iterator[tuple[str, Argument]]:
+    return (pair for each in Source((line,)).walk() if isinstance(each, Part | Group) for pair in each.keywords)
+
+
+def _inside(line: Line, frame: Keywords, numbers: dict[str, float]) -> Line:
+    """A line as it is written in a box with these clearances: with 0 for them where its size needs a side to start
+    from."""
+    assert isinstance(line, Part | Group)
+    inner = tuple((word, 0.0 if (word, value) in frame else value) for word, value in line.keywords)
+    return line if inner == line.keywords else simplified(replace(line, keywords=inner), numbers)
 
 
 def _words(line: Line) -> int:
     """How many words and operators its keywords and their values have."""
-    keywords = (inner.keywords for inner in Source((line,)).walk() if isinstance(inner, Part | Group))
-    return sum(sum(cost(pairs)) for pairs in keywords)
+    return sum(cost(tuple(_keywords(line))))
 
 
 def _drawn(line: Line, numbers: dict[str, float]) -> FloatArray:
@@ -117,6 +101,7 @@ def _drawn(line: Line, numbers: dict[str, float]) -> FloatArray:
     return np.array([float(value) for node in nodes for value in node.values])
 
 
-def _same(drawn: FloatArray, other: FloatArray) -> bool:
+def _same(line: Line, other: Line, numbers: dict[str, float]) -> bool:
     """Whether two lines draw the same whatever the numbers are."""
-    return drawn.shape == other.shape and np.allclose(drawn, other)
+    drawn, others = _drawn(line, numbers), _drawn(other, numbers)
+    return drawn.shape == others.shape and np.allclose(drawn, others)

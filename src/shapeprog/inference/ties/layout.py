@@ -13,7 +13,7 @@ from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, ElementKind, Key, Kind, Slot, ends_of
 from shapeprog.inference.ties.settings import TIES
-from shapeprog.language.ast import Argument, Assignment, Group, Keywords, Line, Part, Point, Source, changed_lines
+from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Name, Value
 from shapeprog.language.placement import AXES, BOX, POINTS, ROUND, SIZES, axis_of
@@ -39,23 +39,20 @@ class Layout:
     anchors
         The anchors of all elements; by default the low side.
     divide
-        Whether neighbours become divisions of a box, also where their row has other parts, and outer mirrors about the
-        middle are around one line each.
+        Whether neighbours become divisions of a box; outer mirrors about the middle, and outer loops with such
+        neighbours, are then around one line each.
     """
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None, *, divide: bool = True) -> None:
-        self._sizes: dict[str, float] = source.evaluated_numbers()
+        self._numbers: dict[str, float] = source.evaluated_numbers()  # by name, at the start
         drawing: list[Line] = []
         for line in source.lines:
             match line:
-                case Group("mirror", keywords, body) if divide and {*keywords} <= {("x", 0.0), ("y", 0.0)}:
-                    # Each may become a division, or move into a box, alone; the text joins the others again.
-                    drawing += [replace(line, body=(inner,)) for inner in body]
-                case Group("translate", body=body) if divide:  # those that become divisions alone
-                    rows = [replace(line, body=(inner,)) for inner in body]
-                    alone = [row for row in rows if self._divisions(row) is not row]
-                    rest = tuple(row.body[0] for row in rows if row not in alone)
-                    drawing += [*alone, *([replace(line, body=rest)] if rest else [])]
+                case Group("mirror" | "translate", keywords, body) if divide:
+                    # Each may become a division, or move into a box, alone; the text joins other mirrors again.
+                    alone = [replace(line, body=(inner,)) for inner in body]
+                    middle = {*keywords} <= {("x", 0.0), ("y", 0.0)}
+                    drawing += alone if middle or any(self._divisions(each) is not each for each in alone) else [line]
                 case Part() | Group():
                     drawing.append(line)
         tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
@@ -65,28 +62,27 @@ class Layout:
         parts = [(index, line) for index, line in enumerate(self.lines) if isinstance(line, Part)]
         self.words = {index - self._divided(index): line.word for index, line in parts}
         self.parts = [*self.words]
-        last = [index + sum(1 for _ in Source((line,)).walk()) - 1 for index, line in enumerate(self.lines)]
-        self.loops_around = [[loop for loop in range(n) if n <= last[loop]] for n in range(len(self.lines))]
+        behind = [index + sum(1 for _ in Source((line,)).walk()) for index, line in enumerate(self.lines)]
+        self.loops_around = [[loop for loop in range(n) if n < behind[loop]] for n in range(len(self.lines))]
         # Cylinders that fill the whole, to which ``_with_radius`` gave no radius: the whole then has one diameter.
         self._filling = [
             index for index, line in parts if line.kind == "cylinder" and "radius" not in dict(line.keywords)
         ]
         if self._filling:
-            self._sizes["depth"] = self._sizes["width"]
-        self.extents = tuple(float(self._sizes[size]) for size in SIZES)
+            self._numbers["depth"] = self._numbers["width"]
+        self.extents = tuple(self._numbers.values())
         self.elements: dict[Key, Element] = {}
         self._anchors = anchors or {}
-        # The numbers (P,), the three sizes of the whole first, their names, and that of every line and keyword.
+        # The numbers (P,), the three sizes of the whole first, and that of every line and keyword.
         self.slots = [Slot(-1, word, "extent", axis, self.extents[axis]) for axis, word in enumerate(SIZES)]
-        self.names = [*SIZES]
         self.index: dict[tuple[int, str], int] = {}
         self._named: list[Part | Group] = []
         self.body = changed_lines(tree, self._with_names)
+        self.names = [*self._numbers]
+        self.numbers: FloatArray = np.array([*self._numbers.values()])  # at the start (P,)
         # What each name is (P + 1,) where one of all numbers is 1 and the others are 0, and where all are 0: a linear
         # function of the numbers is given by these values of it.
         self._forms = dict(zip(self.names, np.eye(len(self.names) + 1), strict=False))
-        self._numbers = {name: slot.value for name, slot in zip(self.names, self.slots, strict=True)}
-        self.numbers: FloatArray = np.array([slot.value for slot in self.slots])  # at the start (P,)
         self.source = Source((Assignment(tuple(self._numbers.items())), *self.body), source.unit, source.scale)
         self.tunable = Tunable(Program(expanded(self.source)))
         assert source.scale is not None
@@ -123,8 +119,8 @@ class Layout:
         """Relations (M, P) that always hold: the width and the depth of a round part that fills the whole are equal."""
         pairs = [(0, 1)] if self._filling else []
         for line in self._filling:
-            sides = [self.index[line, word] for words in AXES[:2] for word in words[:2] if (line, word) in self.index]
-            pairs += [(sides[0], side) for side in sides[1:]]
+            sides = [k for k, slot in enumerate(self.slots) if slot.line == line and slot.kind == "clearance"]
+            pairs += [(sides[0], side) for side in sides[1:] if self.slots[side].axis < 2]
         unit = np.eye(len(self.slots))
         return np.array([unit[a] - unit[b] for a, b in pairs]).reshape(-1, len(self.slots))
 
@@ -153,15 +149,15 @@ class Layout:
                 return replace(row, body=(outer,)) if isinstance(outer, Group) and outer.kind == "divide" else line
             case Group("mirror", ((word, _),), (Part("box" | "cushion") as part,)) if axis_of(word) < 2:
                 axis, count = axis_of(word), 2.0
-                plane, _ = ends_of(line, "plane", axis, self._sizes)
-                moving = [(axis, 2 * plane - sum(ends_of(part, "", axis, self._sizes)))]
+                plane, _ = ends_of(line, "plane", axis, self._numbers)
+                moving = [(axis, 2 * plane - sum(ends_of(part, "", axis, self._numbers)))]
             case _:
                 return line
         given = dict(part.keywords)
         if len(moving) != 1 or not given.keys().isdisjoint({"tilt", "lean"}):
             return line
         ((axis, away),) = moving
-        words, (low, high) = AXES[axis], ends_of(part, "", axis, self._sizes)
+        words, (low, high) = AXES[axis], ends_of(part, "", axis, self._numbers)
         size = high - low
         gap = abs(away) / (count - 1) - size
         if not -TIES.touch < gap <= TIES.gap * size:
@@ -176,31 +172,31 @@ class Layout:
         two and no radius, and is in its middle."""
         if not isinstance(line, Part) or line.kind not in ROUND or "start" in dict(line.keywords):
             return line
-        width, depth = self._sizes["width"], self._sizes["depth"]
-        (left, right), (front, rear) = (ends_of(line, "", axis, self._sizes) for axis in range(2))
+        width, depth = self._numbers["width"], self._numbers["depth"]
+        (left, right), (front, rear) = (ends_of(line, "", axis, self._numbers) for axis in range(2))
         size = min(right - left, rear - front)
         off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
+        sizes: dict[str, Argument] = {"radius": dict(line.keywords).get("radius", size / 2)}
         left_out = {*SIZES[:2], "radius"}
-        keywords: Keywords = (("radius", dict(line.keywords).get("radius", size / 2)),)
         if line.kind == "cylinder" and size > TIES.fills * width and off < TIES.off_middle * width:
-            left_out, keywords = {*AXES[0], *AXES[1], "radius"}, (("width", size), ("depth", size))
-        return replace(line, keywords=(*(pair for pair in line.keywords if pair[0] not in left_out), *keywords))
+            left_out, sizes = {*AXES[0], *AXES[1], "radius"}, {"width": size, "depth": size}
+        return replace(line, keywords=(*(pair for pair in line.keywords if pair[0] not in left_out), *sizes.items()))
 
     def _elements(self, index: int, key: str, axes: Iterable[int] = range(3)) -> Iterator[Element]:
         """The elements of a line along axes; none where a point is not given."""
         line = self.lines[index]
         keywords = dict(line.keywords)
         for axis in axes:
-            low, high = ends_of(line, key, axis, self._sizes)
+            low, high = ends_of(line, key, axis, self._numbers)
             given = key not in ("plane", "centre") or not keywords.keys().isdisjoint(AXES[axis])
             if key == "last":
                 assert isinstance(line, Group)
                 away = max(1, round(float(line.count)) - 1) * float(keywords.get("xyz"[axis], 0.0))  # type: ignore[arg-type]
                 first, inner = self.first(index)
-                low, high = (end + away for end in ends_of(self.lines[first], inner, axis, self._sizes))
+                low, high = (end + away for end in ends_of(self.lines[first], inner, axis, self._numbers))
                 given = away != 0
             elif key in ("through", "end"):
-                given = abs(low - ends_of(line, "start", axis, self._sizes)[0]) > ALIGNED
+                given = abs(low - ends_of(line, "start", axis, self._numbers)[0]) > ALIGNED
             if given:
                 kind: ElementKind = "interval" if key in ("", "across") else "coordinate"
                 if kind == "interval" and axis < 2 and "radius" in keywords:
@@ -223,48 +219,40 @@ class Layout:
         line = self.lines[index]
         given = dict(line.keywords)
         if line.kind == "translate":
-            yield "last", self._point(index, "last")
+            yield "last", Point(tuple(self._measured(index, "last")))
         elif line.kind in ("mirror", "rotate"):
-            yield from self._point(index, "plane" if line.kind == "mirror" else "centre").keywords
+            yield from self._measured(index, "plane" if line.kind == "mirror" else "centre")
         elif "start" in given:
-            yield from ((word, self._point(index, word)) for word in POINTS if word in given)
+            yield from ((word, Point(tuple(self._measured(index, word)))) for word in POINTS if word in given)
             yield from ((word, self._across(index, axis)) for axis, word in enumerate(SIZES) if word in given)
         elif not self._divided(index):
-            for element in self._elements(index, ""):
-                for anchor in sorted({*element.anchors}):
-                    yield self._distance(element, anchor)
-                if element.kind == "interval" and len({*element.anchors}) == 1:
-                    word = SIZES[element.axis]
-                    yield word, self._slot(index, word, "size", element.axis, element.high - element.low)
+            yield from self._measured(index, "")
 
-    def _point(self, index: int, key: str) -> Point:
-        pairs: list[tuple[str, Value]] = []
+    def _measured(self, index: int, key: str) -> Iterator[tuple[str, Value]]:
+        """The keywords of a box or a point: distances from its anchors, and sizes."""
         for element in self._elements(index, key):
-            (anchor,), off = element.anchors, element.middle - self.extents[element.axis] / 2
-            at_middle = key == "plane" and anchor == MIDDLE and abs(off) < ALIGNED
-            pairs.append((AXES[element.axis].offset, 0.0) if at_middle else self._distance(element, anchor))
-        return Point(tuple(pairs))
+            axis, words, extent = element.axis, AXES[element.axis], self.extents[element.axis]
+            for anchor in sorted({*element.anchors}):
+                word = (words.low, words.offset, words.high)[anchor]
+                value = (element.low, element.middle - extent / 2, extent - element.high)[anchor]
+                kind: Kind = "offset" if anchor == MIDDLE else "clearance"
+                at_middle = key == "plane" and anchor == MIDDLE and abs(value) < ALIGNED
+                yield word, 0.0 if at_middle else self._slot(index, f"{key}.{word}".lstrip("."), kind, axis, value)
+            if element.kind == "interval" and len({*element.anchors}) == 1:
+                yield words.size, self._slot(index, words.size, "size", axis, element.high - element.low)
 
     def _across(self, index: int, axis: int) -> Value:
         """A size of a bar: a number, or the extent of the whole less two equal clearances."""
         bar, extent = self.lines[index], self.extents[axis]
         straight = abs(float(dict(bar.keywords).get("turn", 0))) <= TIES.degrees  # type: ignore[arg-type]
-        off = max(abs(ends_of(bar, key, axis, self._sizes)[0] - extent / 2) for key in ("start", "end"))
-        low, high = ends_of(bar, "across", axis, self._sizes)
+        off = max(abs(ends_of(bar, key, axis, self._numbers)[0] - extent / 2) for key in ("start", "end"))
+        low, high = ends_of(bar, "across", axis, self._numbers)
         if axis < 2 and straight and off < TIES.off_middle * extent:
             (element,) = self._elements(index, "across", (axis,))
             if element.anchors == (LOW, HIGH):
                 value = self._slot(index, AXES[axis].low, "clearance", axis, (extent - (high - low)) / 2)
                 return Name(SIZES[axis]) - 2.0 * value
         return self._slot(index, SIZES[axis], "size", axis, high - low)
-
-    def _distance(self, element: Element, anchor: int) -> tuple[str, Name]:
-        """The keyword and the number of a distance from an anchor."""
-        axis, extent = element.axis, self.extents[element.axis]
-        word = (AXES[axis].low, AXES[axis].offset, AXES[axis].high)[anchor]
-        value = (element.low, element.middle - extent / 2, extent - element.high)[anchor]
-        key = f"{element.key}.{word}" if element.key else word
-        return word, self._slot(element.line, key, "offset" if anchor == MIDDLE else "clearance", axis, value)
 
     def _plain(self, index: int, word: str, argument: Argument) -> Argument:
         """A number, or a pair of radii, that is not measured from a side."""
@@ -273,7 +261,7 @@ class Layout:
         return names[0] if len(names) == 1 else names  # type: ignore[return-value]
 
     def _slot(self, line: int, word: str, kind: Kind, axis: int, value: float) -> Name:
-        self.index[line, word] = len(self.slots)
-        self.names.append(f"n{len(self.slots)}")
+        name = Name(f"n{len(self.slots)}")
+        self._numbers[name.name], self.index[line, word] = value, len(self.slots)
         self.slots.append(Slot(line, word, kind, axis, value))
-        return Name(self.names[-1])
+        return name

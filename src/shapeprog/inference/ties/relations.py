@@ -34,12 +34,12 @@ class Relation(NamedTuple):
 class _Face:
     """A low or high end of an element, or its middle.
 
-    It is given with how its coordinate from the low side of the whole follows from the numbers (P,), with that
-    coordinate, and with whether it faces the low or the high side, -1 or 1; 0 for the middle.
+    It is given with how its coordinate from the low side of the whole follows from the numbers (P,), and with whether
+    it faces the low or the high side, -1 or 1; 0 for the middle.
     """
 
-    def __init__(self, element: Element, row: FloatArray, at: float, facing: int) -> None:
-        self.element, self.row, self.at, self.facing = element, row, at, facing
+    def __init__(self, element: Element, row: FloatArray, facing: int) -> None:
+        self.element, self.row, self.facing = element, row, facing
         # From where it is measured: from the low side if it does not move when the whole grows, and so on.
         self.anchor = round(2 * row[element.axis])
         self.single = np.count_nonzero(row[3:]) == 1  # whether it is one number, the distance from its anchor
@@ -109,13 +109,11 @@ def worthwhile(
         edges_then = len(met) - len({where[:2] for where in met})  # axes beyond the first along which pairs meet
         worse = (bounded @ moved < low).any() or edges_then > edges
         new = beside(rows[best], axes)
-        if new is None or (worse and benefit[best] < np.inf):
-            spread[best] = 0.0
-            continue
-        imposed.append(rows[best])
-        axes = np.vstack([axes, new])
-        free = free - np.outer(along, along) / spread[best]
-        numbers, off, spread, edges = moved, off_then, spread_then, edges_then
+        if new is not None and (not worse or benefit[best] == np.inf):
+            imposed.append(rows[best])
+            axes = np.vstack([axes, new])
+            free = free - np.outer(along, along) / spread[best]
+            numbers, off, spread, edges = moved, off_then, spread_then, edges_then
         spread[best] = 0.0
 
 
@@ -124,12 +122,9 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
     slots, eye = layout.slots, np.eye(len(layout.slots))
     floor = TIES.reach * numbers[2]
     for k, slot in enumerate(slots):
-        if slot.kind == "clearance":
-            if slot.word.endswith("bottom") and numbers[k] < floor:
-                yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
-            else:
-                yield Relation(eye[k])
-        elif slot.kind == "gap" and abs(slot.value) <= TIES.touch:
+        if slot.kind == "clearance" and slot.word.endswith("bottom") and numbers[k] < floor:
+            yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
+        elif slot.kind == "clearance" or (slot.kind == "gap" and abs(slot.value) <= TIES.touch):
             yield Relation(eye[k])
         elif slot.kind == "offset":
             limit = TIES.plane if slot.word.startswith("plane") else TIES.within
@@ -138,19 +133,19 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
             yield Relation(eye[k], limit=TIES.degrees)
     for (a, slot), (b, other) in combinations(enumerate(slots), 2):
         limit = TIES.degrees if slot.kind == "angle" else TIES.within
-        if slot.kind != other.kind or abs(numbers[a] - numbers[b]) > limit:
+        smaller, larger = sorted((numbers[a], numbers[b]))
+        if slot.kind != other.kind or larger - smaller > limit:
             continue
-        larger, equal = max(numbers[a], numbers[b]), Relation(eye[a] - eye[b])
-        if slot.kind == "angle" and slot.word == other.word:
-            yield equal._replace(limit=limit)
-        elif slot.kind == "clearance":
-            corner = slot.line == other.line and {slot.axis, other.axis} == {0, 1}
-            if corner and TIES.within < min(numbers[a], numbers[b]) and larger < TIES.section:
-                yield equal
-        elif slot.kind in ("size", "radius", "edge", "gap", "length"):
-            near = abs(numbers[a] - numbers[b]) <= TIES.alike * larger + TIES.rounding
-            if near and (slot.kind != "size" or _comparable(layout, slot, other, larger)):
-                yield equal
+        corner = slot.line == other.line and {slot.axis, other.axis} == {0, 1}
+        near = larger - smaller <= TIES.alike * larger + TIES.rounding
+        if slot.kind == "clearance":
+            related = corner and TIES.within < smaller and larger < TIES.section
+        elif slot.kind == "angle":
+            related = slot.word == other.word
+        else:
+            related = near and (slot.kind != "size" or _comparable(layout, slot, other, larger))
+        if related and slot.kind not in ("extent", "offset"):
+            yield Relation(eye[a] - eye[b], limit=limit)
 
 
 def _comparable(layout: Layout, slot: Slot, other: Slot, larger: float) -> bool:
@@ -172,12 +167,12 @@ def _of_faces(layout: Layout, numbers: FloatArray, touching: set[tuple[int, int]
     faces: list[_Face] = []
     for element, low, high in layout.ends():
         rows = {0: low} if element.kind == "coordinate" else {-1: low, 0: (low + high) / 2, 1: high}
-        faces += [_Face(element, row, float(row @ numbers), facing) for facing, row in rows.items()]
+        faces += [_Face(element, row, facing) for facing, row in rows.items()]
     for axis, extent in enumerate(numbers[:3]):
         along = [face for face in faces if face.element.axis == axis]
         mirrored = [face for face in along if _is_mirrored(layout, face.element)]
-        along += [_Face(face.element, unit[axis] - face.row, extent - face.at, -face.facing) for face in mirrored]
-        at = np.array([face.at for face in along])
+        along += [_Face(face.element, unit[axis] - face.row, -face.facing) for face in mirrored]
+        at = np.array([face.row @ numbers for face in along])
         off = np.minimum(np.abs(at - at[:, None]), np.abs(at + at[:, None] - extent))
         for first, second in np.argwhere(np.triu(off <= 2 * TIES.within, 1)).tolist():  # no relation allows more
             yield from _pair(layout, along[first], along[second], touching)

@@ -76,7 +76,6 @@ class TieSettings:
 
     # Numbers that carry parts
     changes: tuple[float, ...] = (0.7, 1.4)  # what a name is multiplied by to see which parts it separates
-    ahead: int = 16  # most elements whose anchors are tried in one batch
     changed: int = 64  # most changed programs that are drawn at once
 
     # Fit

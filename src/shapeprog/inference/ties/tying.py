@@ -18,7 +18,6 @@ from scipy.spatial import cKDTree
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_tensor_thread
 from shapeprog.geometry.mesh import pieces_of_parts
-from shapeprog.inference.budget import Progress
 from shapeprog.inference.candidates.drawings import solid_boxes
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.fit.tunable import CELLS, DEGREES
@@ -50,7 +49,6 @@ def tie(
     floor: float | None = None,
     held: Collection[int] = (),
     seed: int = 0,
-    progress: Progress | None = None,
 ) -> Program:
     """The same program placed from the sides, with names for shared numbers; the same for the same seed.
 
@@ -76,29 +74,25 @@ def tie(
         return program
     with one_tensor_thread(kernels=1):
         try:
-            written_by_hand = program.source if known else None
+            whole = program.source if known else None
             given = plain if held else merged(plain)
-            tied = placed(given, merge=not held, rows=False, floor=floor, whole=written_by_hand)
+            tied = placed(given, merge=not held, rows=False, floor=floor, whole=whole)
         except ShapeProgError:  # a statement without a placed form
             return program
         assert tied.source is not None
         ties = _Ties(tied.source, evidence, seed, known=known, held=held)
-        price *= ties.price
-        surface = None if known else cKDTree(evidence.surface, balanced_tree=False)  # faster to build
-        before = 0.0 if surface is None else closeness(unroll(plain), surface, seed)
-        least = math.inf
+        surface = cKDTree(evidence.surface, balanced_tree=False)  # faster to build
+        before, least = closeness(unroll(plain), surface, seed), math.inf
         for attempt in range(TIES.attempts):
             try:
-                offered = ties.tied(price / TIES.cheaper**attempt)
+                offered = ties.tied(price * ties.price / TIES.cheaper**attempt)
             except Fault:  # relations left a part without length
                 continue
-            lost = 0.0 if surface is None else before - closeness(unroll(offered), surface, seed)
+            lost = 0.0 if known else before - closeness(unroll(offered), surface, seed)
             if lost < least:
                 tied, least = offered, lost
             if lost <= TIES.lost:
                 break
-        if progress:
-            progress("tying numbers", 1.0)
     return tied
 
 
@@ -161,7 +155,7 @@ class _Ties:
             if not loose:
                 break
             self.misfit.together *= np.where(np.isin(self.joined, [*loose]).any(1), TIES.heavier, 1.0)
-        return evaluated(written(self.layout, solution, free, group=not self.fixed.any()))
+        return evaluated(written(self.layout, solution, free))
 
     def _loose(self, numbers: FloatArray) -> set[int]:
         """The lines with parts outside the largest connected solid."""
@@ -170,20 +164,20 @@ class _Ties:
 
     def _solved(self, price: float) -> tuple[Solution, FloatArray]:
         """The free numbers at a price of a number, and their values (Z,)."""
-        numbers, rows = self.layout.numbers, self.layout.fixed()
+        layout, numbers, rows = self.layout, self.layout.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
-            candidates = [
-                relation for relation in (relations(self.layout, numbers, self.touching) if step else self.related)
-                if not relation.row[self.fixed].any() and (step > 0 or relation.trust in (TIES.contact, TIES.floor))
-            ]  # fmt: skip
-            candidates, before = [*(Relation(row, math.inf) for row in rows), *candidates], len(rows)
+            candidates, before = [Relation(row, math.inf) for row in rows], len(rows)
+            for relation in relations(layout, numbers, self.touching) if step else self.related:
+                early = relation.trust in (TIES.contact, TIES.floor)
+                if (step or early) and not relation.row[self.fixed].any():
+                    candidates.append(relation)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            low, bounded = self.layout.low, self.layout.jacobian
+            low, bounded = layout.low, layout.jacobian
             rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded)
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)
-        return carried(solved(self.layout.slots, rows), self.layout, numbers)
+        return carried(solved(layout.slots, rows), layout, numbers)
 
 
 def between_ends(program: Program) -> Program:

@@ -940,3 +940,19 @@ def test_steps_that_would_be_shorter_as_a_row_are_tied():
     tied = tie(program, evidence_of_program(program))
     assert tied.source.lines[-1].kind == "row"
     assert float((unroll(tied).centre - unroll(program).centre).abs().max()) < 0.5
+
+
+@pytest.mark.parametrize(
+    "rod",
+    [
+        "rod(start=(1, 5.8, 10), end=(1.27, 6, 10), radius=0.3)",
+        "taper(start=(1, 5.8, 10), end=(1.14, 6, 10.1), radius=(0.3, 0.5))",
+    ],
+)
+def test_a_rod_shorter_than_a_relation_may_be_off_keeps_half_of_its_length(rod: str):
+    program = sp.parse(f"box(at=(0, -6, -12), size=(1, 12, 24))\nfor i in mirror(side):\n    {rod}\n")
+    tied = tie(program, evidence_of_program(program))
+    before, after = (program.draws[-1].values[:6] for program in (program, tied))
+    lengths = [float(np.abs(np.subtract(values[3:], values[:3])).max()) for values in (before, after)]
+    assert lengths[1] >= 0.49 * lengths[0]
+    assert len(sp.names(tied)) > 3, "its numbers are tied"

@@ -91,11 +91,23 @@ class Layout:
         nodes = list(Program(symbolic(self.source, self._forms, (floor, scale.middle))).walk())
         none = np.zeros(len(self.slots) + 1)
         values = np.array([none + nodes[n].values[slot] for n, slot in self.tunable.moving]).reshape(-1, len(none))
-        # How the numbers of its statements in cells follow from those of the text (F, P), up to constants, and lower
-        # bounds (F,) of the products of both: no part may become thinner than ``THINNEST``.
+        # How the numbers of its statements in cells follow from those of the text (F, P), up to constants.
         self.jacobian: FloatArray = values[:, :-1] - values[:, -1:]
         self._offset = values[:, -1]
-        self.low: FloatArray = self.tunable.low.numpy() - self._offset
+        # Rows (G, P) and lower bounds (G,) of their products with the numbers: no part may become thinner than
+        # ``THINNEST``, and no rod less than half as long.
+        rods = [none[:-1] + self._along(line) for line in self._named if "end" in dict(line.keywords)]
+        self.bounded: FloatArray = np.vstack([self.jacobian, *rods])
+        shortest = [float(rod @ self.numbers) / 2 for rod in rods]
+        self.low: FloatArray = np.append(self.tunable.low.numpy() - self._offset, shortest)
+
+    def _along(self, line: Part | Group) -> FloatArray:
+        """How the length of a rod along the axis that it runs along most follows from the numbers (P,)."""
+        ends = ([ends_of(line, key, axis, self._numbers, self._forms)[0] for axis in range(3)] for key in POINTS[::2])
+        ways = np.array([end - start for start, end in zip(*ends, strict=True)])[:, :-1]
+        lengths = ways @ self.numbers
+        longest = np.abs(lengths).argmax()
+        return ways[longest] * np.sign(lengths[longest])
 
     def values(self, numbers: FloatArray) -> Tensor:
         """The numbers of the statements in cells (..., F) where those of the text are these (..., P)."""

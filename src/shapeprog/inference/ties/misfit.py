@@ -71,18 +71,18 @@ class Misfit:
 
         A thickness that a step would take below its bound is fixed, and the step is solved again (an active set).
         """
-        farthest, jacobian = TIES.farthest / self.reach, self.layout.jacobian
-        low = np.minimum(self.layout.low, jacobian @ numbers) - HOLDS
+        farthest, bounded = TIES.farthest / self.reach, self.layout.bounded
+        low = np.minimum(self.layout.low, bounded @ numbers) - HOLDS
         for _ in range(TIES.steps):
             slope, curvature = self.at(numbers, 1, joined=True)
             while True:
                 free = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]  # orthonormal directions
                 move = free @ -np.linalg.solve(free.T @ curvature @ free, free.T @ slope)
                 onwards = numbers + move / float(np.max(np.abs(move) / farthest, initial=1.0))
-                thin = ~(jacobian @ onwards >= low)  # also where a part without length has no slopes
+                thin = ~(bounded @ onwards >= low)  # also where a part without length has no slopes
                 if not thin.any():
                     break
-                rows = np.vstack([rows, jacobian[thin]])
+                rows = np.vstack([rows, bounded[thin]])
             numbers = onwards
         return numbers
 

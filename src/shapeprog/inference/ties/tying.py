@@ -172,7 +172,7 @@ class _Ties:
                 if (step or early) and not relation.row[self.fixed].any():
                     candidates.append(relation)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            low, bounded = layout.low, layout.jacobian
+            low, bounded = layout.low, layout.bounded
             rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded)
             if step and len(rows) == before:
                 break

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,12 +11,20 @@ import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import parts
+from shapeprog.geometry.mesh import part_meshes
 from shapeprog.inference.fit.snapping import snapped
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program, off_parts
+from shapeprog.inference.surface.oriented import boxes_around, boxes_of
 from shapeprog.inference.ties.tying import tie
+from shapeprog.language.hints import Box, level_ends, upright_box
 from shapeprog.language.parser import parse
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
+
+PIECES = Path(__file__).parent.parent / "examples" / "pieces"
+
+ENDS = "box(at=(-8, -5, -12), size=(16, 10, 1))\nbox(at=(-8, -5, 11), size=(16, 10, 1))\n"
+"""Two boards that make the whole as long as the grid, so that its numbers are those of the mesh."""
 
 CARCASS = """\
 # unit: mm
@@ -47,6 +57,13 @@ def test_boards_of_two_thicknesses_keep_them_and_the_whole_its_size():
     program = sp.infer(apart(CARCASS), unit="mm").program  # 24 cells are 240 mm
     found = {name.name: round(name.value / 0.3, 1) for name in sp.names(program)}
     assert found == {"width": 800, "depth": 350, "height": 600, "top_thickness": 22, "thickness": 18}
+
+
+def test_the_whole_is_that_of_the_mesh_though_its_parts_are_fitted_a_little_off():
+    text = ENDS + "box(at=(7, -4, -11), size=(1, 8, 22))\n"
+    off = text.replace("at=(-8, -5, -12), size=(16, 10, 1)", "at=(-7.9, -5.1, -11.8), size=(16.1, 10.2, 0.8)")
+    sizes = {name.name: name.value for name in sp.names(tie(parse(off), evidence_of(apart(text)), floor=-8.0))}
+    assert np.allclose([sizes["width"], sizes["depth"], sizes["height"]], [24, 10, 16], atol=0.01)
 
 
 def test_the_whole_is_as_large_as_the_mesh_though_a_tie_would_move_it():
@@ -89,10 +106,6 @@ def test_copies_near_one_component_stay_apart():
     assert values(found)[0] == values(row)[0]
 
 
-ENDS = "box(at=(-8, -5, -12), size=(16, 10, 1))\nbox(at=(-8, -5, 11), size=(16, 10, 1))\n"
-"""Two boards that make the whole as long as the grid, so that its numbers are those of the mesh."""
-
-
 @pytest.mark.parametrize(
     "draw", ["cylinder(at=(-6, 0, 0), height=12, radius=2)", "box(at=(-6, -0.3, -2), size=(12, 0.6, 4))"]
 )
@@ -119,6 +132,10 @@ def test_boards_of_a_row_stay_as_long_as_they_are():
             "board(at=(-6, -4, {}), size=(12, 0.5, 3), tilt=12)",
             "board(at=(-5.8, -4.1, {}), size=(11.9, 0.6, 3.1), tilt=12.5)",
         ),
+        (
+            "leaning_box(at=(-6, -4, {}), size=(12, 1, 3), lean=3)",
+            "board(at=(-5.9, -4, {}), size=(12.4, 1, 3), tilt=14)",
+        ),
     ],
 )
 def test_what_leans_is_drawn_on_its_component_as_well(given: str, fitted: str):
@@ -126,6 +143,31 @@ def test_what_leans_is_drawn_on_its_component_as_well(given: str, fitted: str):
     found = snapped(start, evidence_of(apart(given.replace("{}", "2") + "\n" + ENDS)))
     assert np.allclose(values(found)[0], values(target)[0], atol=0.03)
     assert not np.allclose(values(start)[0], values(target)[0], atol=0.03)
+
+
+@pytest.mark.parametrize(
+    "text", ["leaning_box(at=(-6, -4, 2), size=(12, {}, 3), lean={})", "box(at=(-6, {}, {}), size=(3, 4, 5))"]
+)
+@pytest.mark.parametrize(("depth", "lean"), [(0.5, 2.0), (2.0, -3.0), (3.0, 7.0)])
+def test_the_box_of_a_primitive_is_the_smallest_around_its_corners(text: str, depth: float, lean: float):
+    scene = unroll(parse(text.format(depth, lean)))
+    (mesh,) = part_meshes(scene)
+    box, around = boxes_of(scene), boxes_around([mesh.vertices])
+    assert np.allclose(box.half.prod(), around.half.prod(), rtol=1e-4)
+    assert np.allclose(np.sort(box.half[0]), np.sort(around.half[0]), atol=1e-4)
+    assert np.allclose(box.centre, around.centre, atol=1e-4)
+    (start,) = (level_ends if "lean" in text else upright_box)(Box(*(column[0] for column in around)))
+    assert np.allclose(start, parse(text.format(depth, lean)).draws[0].values, atol=1e-4)
+
+
+def test_a_shelf_with_sheared_sides_comes_back_as_it_was_written():
+    text = (PIECES / "ladder_shelf.shape").read_text()
+    shape = apart(text)
+    program = sp.infer(shape).program
+    evidence = evidence_of(shape)
+    assert off_parts(unroll(program), evidence).min(-1).max() < 0.02
+    (side,) = [node for node in program.walk() if node.name == "leaning_box"]
+    assert abs(side.values[-1] - side.values[4] * 5) < 0.03  # the lean of 35 is five times the depth of 7
 
 
 def test_a_round_part_is_not_on_a_square_one_of_the_same_box():

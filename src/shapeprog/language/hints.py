@@ -60,6 +60,17 @@ def tilted_board(box: Box) -> Iterator[list[float]]:
     yield [*corner, *(2 * half), tilt]
 
 
+def level_ends(box: Box) -> Iterator[list[float]]:
+    """Low corner, extents and shift of the top, of a box turned about the left-right axis, with level ends inside."""
+    for *_, length, thickness, width, tilt in tilted_board(box):
+        angle = np.radians(tilt)
+        depth = thickness / np.cos(angle)
+        height = length * np.cos(angle) - thickness * abs(np.sin(angle))
+        if height > 0:
+            lean = height * np.tan(angle)
+            yield [*(box.centre - np.array([height, depth + lean, width]) / 2), height, depth, width, lean]
+
+
 def straight_bar(box: Box) -> Iterator[list[float]]:
     """Two ends, section and turn, of a box along its longest side."""
     yield bar_along(box, int(box.half.argmax()))

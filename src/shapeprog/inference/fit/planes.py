@@ -15,17 +15,14 @@ import torch
 from shapeprog.geometry.mesh import triangle_normals
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import KINDS
-from shapeprog.geometry.primitives.cuboid import CUBOID
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import THINNEST, Poses, Tunable
 from shapeprog.inference.surface.components import Components
 from shapeprog.inference.surface.evidence import Evidence
-from shapeprog.inference.surface.oriented import Boxes
+from shapeprog.inference.surface.oriented import LEAN, Boxes
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray, IntArray
-
-LEAN = CUBOID.sizes.index("lean")  # slot of the lean of a cuboid; one that leans has faces along no axis
 
 
 class Faces(NamedTuple):

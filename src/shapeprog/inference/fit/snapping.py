@@ -11,8 +11,11 @@ from shapeprog.inference.candidates.drawings import drawings, scene_of
 from shapeprog.inference.candidates.loops import loop_values
 from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.surface.evidence import Evidence, off_parts, seen_along
-from shapeprog.language.hints import Box
-from shapeprog.language.program import Loop, Program, nest
+from shapeprog.inference.surface.oriented import boxes_of
+from shapeprog.inference.surface.settings import SURFACE
+from shapeprog.language.hints import Box, level_ends
+from shapeprog.language.parameters import to_float32
+from shapeprog.language.program import Draw, Loop, Program, nest
 
 
 def snapped(program: Program, evidence: Evidence) -> Program:
@@ -20,15 +23,15 @@ def snapped(program: Program, evidence: Evidence) -> Program:
 
     A copy lies on a component if no face of the box around it is farther off than ``FIT.component``, or, outside of
     rows, if both share most of the box around them: the fit does not know ends that other parts hide.  The first copy
-    of a block is drawn anew on its component, if its statement draws such boxes in one way; rows end at that of their
-    last copy, if it is another.
+    of a block is drawn anew on its component, if its statement draws such boxes in one way, or as a sheared box if that
+    fills as much of the box around it as the component; rows end at that of their last copy, if it is another.
     """
     if not program.size or not len(evidence.part_fill):
         return program
     scene = scene_of(program.body)
-    off = off_parts(scene, evidence)
+    off, straight = off_parts(scene, evidence, SURFACE.off_fill), evidence.parts.straight
     nearest, distance = off.argmin(-1), off.min(-1)
-    centre, axes, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
+    centre, axes, half = boxes_of(scene)
     away, reach = seen_along(axes, centre, evidence.parts, nearest)
     low, high = np.stack([away - reach, -half]), np.stack([away + reach, half])
     shared, around = (high.min(0) - low.max(0)).clip(0).prod(-1), (high.max(0) - low.min(0)).prod(-1)
@@ -42,8 +45,18 @@ def snapped(program: Program, evidence: Evidence) -> Program:
         alone = all(loop.name != "translate" for loop in loops)  # copies in a row may be on components of other sizes
         if len(slots) != copies or not (close | (mostly & alone))[row, first := slots[0]]:
             continue
-        options = drawings(Box(*(column[nearest[row, first]] for column in evidence.parts)), draw.name)
+        component = nearest[row, first]
+        box = Box(*(column[component] for column in evidence.parts))
+        options = drawings(box, draw.name)
         if len(options) != 1:
+            continue
+        if draw.name in ("board", "bar"):  # the ends of what leans are square or level
+            options += [Draw("leaning_box", tuple(map(to_float32, values))) for values in level_ends(box)]
+        drawn = scene_of(options)
+        fill = drawn.volumes[:, 0].numpy() / (2 * boxes_of(drawn).half[:, 0]).prod(-1)
+        unlike = np.abs(fill - evidence.part_fill[component])
+        best = unlike.argmin()
+        if unlike[best] > (SURFACE.off_fill if straight[component] else SURFACE.off_box):
             continue
         for level, loop in enumerate(loops):
             copies //= loop.count
@@ -53,5 +66,5 @@ def snapped(program: Program, evidence: Evidence) -> Program:
                 way = (middle[row, last] - middle[row, first]) / max(loop.count - 1, 1)
                 step = np.where(np.array(loop.values[1:]) == 0, 0.0, way)
                 loops[level] = replace(loop, values=loop_values(loop.count, *step.tolist()))
-        body[row] = nest((*loops, replace(options[0], role=draw.role)))
+        body[row] = nest((*loops, replace(options[best], role=draw.role)))
     return Program(tuple(body))

@@ -8,12 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shapeprog.geometry.primitives import KINDS
+from shapeprog.geometry.primitives.cuboid import CUBOID
+from shapeprog.geometry.scene import Scene
 from shapeprog.inference.surface.cloud import spiral
 from shapeprog.inference.surface.oriented_kernels import COMPACT, FLAT, ROD, turn_each
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.space import Array, BoolArray, FloatArray, IntArray
 
-CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # the corners (8, 3) of a box of half extents 1
+LEAN = CUBOID.sizes.index("lean")  # slot of the shear of a cuboid
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # of a box of half extents 1, (8, 3)
 SPHERE = np.ascontiguousarray(spiral((np.arange(80) + 0.5) / 80)[:, [1, 2, 0]].T)
 """Evenly spread unit vectors (3, 80), one of each opposite pair, that define the outermost points."""
 
@@ -43,6 +47,23 @@ def join(parts: Sequence[Boxes]) -> Boxes:
     """All boxes of a list, in its order."""
     empty = Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
     return Boxes(*(np.concatenate(column) for column in zip(empty, *parts, strict=True)))
+
+
+def boxes_of(scene: Scene) -> Boxes:
+    """The boxes around primitives (..., N); those of sheared boxes lie along their slanted faces.
+
+    A sheared box of height h, depth d and shift s fills a box that is turned by a = atan(s / h), of length
+    h / cos a + d |sin a| and thickness d cos a.
+    """
+    centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
+    height, depth, lean = (2 * scene.size[..., slot].numpy() for slot in (0, 1, LEAN))
+    angle = np.where(scene.kind.numpy() == KINDS["cuboid"], np.arctan2(lean / 2, height), 0.0)
+    if not angle.any():
+        return Boxes(centre, rotation, half)
+    cosine, sine, zero = np.cos(angle), np.sin(angle), np.zeros_like(angle)
+    turn = np.stack([cosine, -sine, zero, sine, cosine, zero, zero, zero, zero + 1], -1).reshape(*angle.shape, 3, 3)
+    sizes = np.stack([height / cosine + depth * np.abs(sine), depth * cosine, 2 * half[..., 2]], -1)
+    return Boxes(centre, rotation @ turn, np.where((angle != 0)[..., None], sizes / 2, half))
 
 
 def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor: float = SURFACE.thin) -> Boxes:

@@ -75,8 +75,10 @@ def tie(
     with one_tensor_thread(kernels=1):
         try:
             whole = program.source if known else None
+            corners = None if known or evidence.mesh is None else evidence.mesh.vertices
+            box = None if corners is None else (corners.min(0), corners.max(0))
             given = plain if held else merged(plain)
-            tied = placed(given, merge=not held, rows=False, floor=floor, whole=whole)
+            tied = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box)
         except ShapeProgError:  # a statement without a placed form
             return program
         assert tied.source is not None
@@ -116,12 +118,10 @@ class _Ties:
         exact = not known and self._is_exact(evidence)
         self.price = TIES.known_price if known or exact else TIES.price
         weight = TIES.known if known else TIES.exact if exact else 0.0
-        minimum, start = np.where(self.fixed, 1e6, weight), layout.numbers.copy()
+        minimum = np.where(self.fixed, 1e6, weight)
         if evidence.mesh is not None and not known:  # the size of a mesh is exact
-            size = np.ptp(evidence.mesh.vertices, 0)[::-1]
-            start[:3] = np.where(np.abs(size - start[:3]) < TIES.nearly, size, start[:3])
             minimum[:3] = np.maximum(minimum[:3], TIES.extent)
-        self.misfit = Misfit(layout, evidence, joints, start, minimum, seed)
+        self.misfit = Misfit(layout, evidence, joints, layout.numbers, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
         self.zero = 0.0 if known else TIES.zero  # a distance that somebody wrote stays
 

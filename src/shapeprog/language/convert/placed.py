@@ -40,9 +40,18 @@ from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 EMPTY = 0.1
 """Share of the height that may be empty below the parts, as the feet that no part stands for."""
 
+NEAR = 0.3
+"""Cells between a side of the parts and of the shape that are a misfit, and no part that is missing."""
+
 
 def placed(
-    program: Program, *, merge: bool = True, rows: bool = True, floor: float | None = None, whole: Source | None = None
+    program: Program,
+    *,
+    merge: bool = True,
+    rows: bool = True,
+    floor: float | None = None,
+    whole: Source | None = None,
+    box: tuple[FloatArray, FloatArray] | None = None,
 ) -> Program:
     """The same shape with its parts placed from the sides of its bounding box about the middle of the grid.
 
@@ -60,6 +69,8 @@ def placed(
         empty below the parts.  Read without its frame, the text is placed about the middle of that box.
     whole
         A placed source whose box is that of the result, instead of the box around the parts.
+    box
+        The low and high corner (3,) of the shape in the grid: where the parts end near a side of it, so does the box.
 
     Raises
     ------
@@ -75,6 +86,8 @@ def placed(
         extents = np.array([numbers[size] for size in ("height", "depth", "width")]) * scale.cells_per_unit
         middle[:] = scale.floor + extents[UP] / 2, scale.middle, 0.0
         low, high = middle - extents / 2, middle + extents / 2
+    if box is not None:
+        low, high = (np.where(np.abs(a - b) <= NEAR, b, a) for a, b in zip((low, high), box, strict=True))
     if floor is not None:
         if 0 < low[UP] - floor <= EMPTY * (high[UP] - floor):
             low[UP] = floor

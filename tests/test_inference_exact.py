@@ -14,7 +14,7 @@ from shapeprog.formats.parts import parts
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.inference.fit.snapping import snapped
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program, off_parts
-from shapeprog.inference.surface.oriented import boxes_around, boxes_of
+from shapeprog.inference.surface.oriented import boxes_around, primitive_boxes
 from shapeprog.inference.ties.tying import tie
 from shapeprog.language.hints import Box, level_ends, upright_box
 from shapeprog.language.parser import parse
@@ -145,6 +145,22 @@ def test_what_leans_is_drawn_on_its_component_as_well(given: str, fitted: str):
     assert not np.allclose(values(start)[0], values(target)[0], atol=0.03)
 
 
+def test_a_mitred_board_is_not_sheared_though_it_fills_as_much_of_its_box():
+    sheared = parse("leaning_box(at=(-6, -4, 2), size=(12, 1, 3), lean=3)\n" + ENDS)
+    (part, *others), along = part_meshes(unroll(sheared)), np.array([12, 3, 0]) / np.hypot(12, 3)
+    vertices, top = part.vertices.copy(), part.vertices[:, 0] > 0
+    rear = np.where(vertices[:, 1] > -0.5, -1, 1)[top]  # of the upper end, which then runs the other way
+    vertices[top] += (rear * along[1])[:, None] * along
+    start = parse("board(at=(-5.9, -4, 2), size=(12.4, 1, 3), tilt=14)")
+    for points, name in ((part.vertices, "leaning_box"), (vertices, "board")):
+        faces, count = [part.faces, *(other.faces for other in others)], np.cumsum([0, 8, 8])
+        mesh = np.concatenate([points, *(other.vertices for other in others)])
+        stacked = np.concatenate([face + first for face, first in zip(faces, count, strict=True)])
+        evidence = evidence_of(shape_from_mesh(mesh, stacked, axes=np.eye(3)))
+        assert np.allclose(evidence.part_fill.min(), 1 - along[1] * along[0] * 0.97 / 12.6, atol=0.01)
+        assert snapped(start, evidence).draws[0].name == name
+
+
 @pytest.mark.parametrize(
     "text", ["leaning_box(at=(-6, -4, 2), size=(12, {}, 3), lean={})", "box(at=(-6, {}, {}), size=(3, 4, 5))"]
 )
@@ -152,7 +168,7 @@ def test_what_leans_is_drawn_on_its_component_as_well(given: str, fitted: str):
 def test_the_box_of_a_primitive_is_the_smallest_around_its_corners(text: str, depth: float, lean: float):
     scene = unroll(parse(text.format(depth, lean)))
     (mesh,) = part_meshes(scene)
-    box, around = boxes_of(scene), boxes_around([mesh.vertices])
+    box, around = primitive_boxes(scene), boxes_around([mesh.vertices])
     assert np.allclose(box.half.prod(), around.half.prod(), rtol=1e-4)
     assert np.allclose(np.sort(box.half[0]), np.sort(around.half[0]), atol=1e-4)
     assert np.allclose(box.centre, around.centre, atol=1e-4)

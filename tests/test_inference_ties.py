@@ -921,7 +921,7 @@ def test_a_refit_goes_on_where_a_part_would_become_too_thin():
     start = sp.parse("top(box(at=(4, -8, -12), size=(0.1, 16, 24)))\nbase(box(at=(-6, -8, -12), size=(2.4, 16, 24)))\n")
     layout = Layout(placed(start).source)
     joints = find_joints(layout.scene(layout.numbers), -1e6)
-    misfit = Misfit(layout, evidence_of_program(target), joints, layout.numbers, np.zeros(len(layout.numbers)), 0)
+    misfit = Misfit(layout, evidence_of_program(target), joints, np.zeros(len(layout.numbers)), 0)
     fitted = misfit.refitted(layout.numbers, np.zeros((0, len(layout.numbers))))
     (top, base) = layout.scene(fitted).size[:, 0].tolist()
     assert top >= 0.05 - 1e-6  # half of the least thickness

@@ -104,6 +104,7 @@ def over_threads(work: Callable[[int, int], None], count: int, *, least: int = 1
 
 @cache
 def _libraries() -> ThreadpoolController:
+    """The libraries of linear algebra that are loaded at the first call: those of NumPy and SciPy."""
     return ThreadpoolController()
 
 

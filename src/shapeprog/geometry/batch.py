@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -52,7 +53,7 @@ class Batch:
         """Where the tensors are."""
         return self.mask.device
 
-    @property
+    @cached_property
     def kinds(self) -> list[int]:
         """Kinds of primitive in use."""
         return np.flatnonzero(np.bincount(self.kind[self.mask].cpu().numpy())).tolist()

@@ -1,4 +1,4 @@
-"""Parts that touch, for many scenes at once.
+"""Parts that touch, for many scenes at once, and connected components of graphs.
 
 Pairs whose boxes along the axes of the grid overlap are compared by alternating projections (von Neumann 1933).
 """
@@ -11,7 +11,7 @@ from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import array, table_of
 from shapeprog.geometry.batch import Batch
 from shapeprog.kernels.table import CENTRE, ROTATION, WIDTH
-from shapeprog.space import BoolArray
+from shapeprog.space import Array, BoolArray, IntArray
 
 TOUCHING = 0.02
 """Gap in cells up to which parts touch."""
@@ -22,10 +22,18 @@ ROUNDS = 500
 
 def contact_groups(scenes: Batch) -> list[int]:
     """The number of groups of touching primitives in each scene of a batch (B, N)."""
+    graphs = zip(touching(scenes, TOUCHING), array(scenes.mask), strict=True)
+    labels = (linked(np.argwhere(graph[here][:, here]), here.sum()) for graph, here in graphs)
+    return [int(label.max(initial=-1)) + 1 for label in labels]
+
+
+def linked(pairs: Array, count: int) -> IntArray:
+    """The connected component (count,) of each of ``count`` items, from linked pairs (P, 2)."""
+    from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    graphs = zip(touching(scenes, TOUCHING), array(scenes.mask), strict=True)
-    return [connected_components(graph[here][:, here])[0] for graph, here in graphs]
+    graph = coo_array((np.ones(len(pairs), np.bool_), pairs.T), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def touching(scenes: Batch, within: float) -> BoolArray:

@@ -15,12 +15,12 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
+from shapeprog.geometry.contacts import linked
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.inference.candidates.drawings import drawings, solid_boxes
 from shapeprog.inference.candidates.loops import images, mirror, mirrors, repeated, rows
 from shapeprog.inference.candidates.settings import SETTINGS
 from shapeprog.inference.fit.tunable import THINNEST
-from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.inference.surface.oriented import CORNERS, boxes_around
 from shapeprog.language.hints import STRAIGHT, Box

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from shapeprog.geometry.contacts import linked
 from shapeprog.inference.pieces.settings import SETTINGS
 from shapeprog.inference.surface.cloud import Cloud
-from shapeprog.inference.surface.components import linked
 from shapeprog.inference.surface.oriented import Boxes, boxes_around
 from shapeprog.space import FloatArray, IntArray
 

@@ -63,7 +63,7 @@ def _points_on(rod: Rod, cloud: Cloud) -> tuple[IntArray, FloatArray]:
 def _bounded(rod: Rod, cloud: Cloud) -> tuple[Rod, int]:
     """A cylinder cut to the stretch of its axis from its middle that has points, and how many; 0 where it is no rod.
 
-    The cloud has half of the points.
+    The cloud has half of the points.  A stretch ends where half a cell is empty.
     """
     _, (x, y, z) = _points_on(rod, cloud)
     if 2 * len(z) < SETTINGS.rod_points:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from shapeprog.geometry.contacts import linked
 from shapeprog.geometry.mesh import triangle_normals
 from shapeprog.space import Array, FloatArray, IntArray
 
@@ -110,9 +109,3 @@ def enclosed(mesh: Components) -> FloatArray:
     gaps = np.add.reduceat(open_edges, mesh.start[:-1]) / (3 * np.diff(mesh.start))
     volume = np.add.reduceat(np.linalg.det(mesh.vertices[mesh.faces]), mesh.start[:-1]) / 6
     return np.where(gaps <= 0.02, volume, np.nan)
-
-
-def linked(pairs: Array, count: int) -> IntArray:
-    """The connected component (count,) of each of ``count`` items, from linked pairs (P, 2)."""
-    graph = coo_array((np.ones(len(pairs), np.bool_), pairs.T), (count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)

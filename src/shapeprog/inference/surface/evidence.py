@@ -20,7 +20,7 @@ from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.inference.surface.cloud import planes, points_of_scan, spiral
 from shapeprog.inference.surface.components import Components, components, enclosed, solid_sides
 from shapeprog.inference.surface.evidence_kernels import look_out
-from shapeprog.inference.surface.oriented import Boxes, boxes_around, boxes_of, join
+from shapeprog.inference.surface.oriented import Boxes, boxes_around, join, primitive_boxes
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
@@ -70,7 +70,7 @@ def off_parts(scene: Scene, evidence: Evidence, off_fill: float = SURFACE.off_bo
     """How far the faces of the box around each primitive are at most from those of each part of a mesh (..., N, K), in
     cells; infinitely if only one leans, or the two do not fill the same share of their boxes, to ``off_fill`` if they
     lean."""
-    centre, rotation, half = boxes = boxes_of(scene)
+    centre, rotation, half = boxes = primitive_boxes(scene)
     fill = scene.volumes.numpy() / np.maximum((2 * half).prod(-1), 1e-9)  # of padding 0, of parts of a mesh never
     off, straight = np.full((*fill.shape, len(evidence.part_fill)), np.inf), boxes.straight
     for k, (share, along) in enumerate(zip(evidence.part_fill, evidence.parts.straight, strict=True)):

@@ -49,21 +49,20 @@ def join(parts: Sequence[Boxes]) -> Boxes:
     return Boxes(*(np.concatenate(column) for column in zip(empty, *parts, strict=True)))
 
 
-def boxes_of(scene: Scene) -> Boxes:
+def primitive_boxes(scene: Scene) -> Boxes:
     """The boxes around primitives (..., N); those of sheared boxes lie along their slanted faces.
 
-    A sheared box of height h, depth d and shift s fills a box that is turned by a = atan(s / h), of length
-    h / cos a + d |sin a| and thickness d cos a.
+    A box of height h and depth d, sheared by an angle a, fills one of length h / cos a + d |sin a| and depth d cos a.
     """
-    centre, rotation, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
-    height, depth, lean = (2 * scene.size[..., slot].numpy() for slot in (0, 1, LEAN))
-    angle = np.where(scene.kind.numpy() == KINDS["cuboid"], np.arctan2(lean / 2, height), 0.0)
-    if not angle.any():
-        return Boxes(centre, rotation, half)
-    cosine, sine, zero = np.cos(angle), np.sin(angle), np.zeros_like(angle)
-    turn = np.stack([cosine, -sine, zero, sine, cosine, zero, zero, zero, zero + 1], -1).reshape(*angle.shape, 3, 3)
-    sizes = np.stack([height / cosine + depth * np.abs(sine), depth * cosine, 2 * half[..., 2]], -1)
-    return Boxes(centre, rotation @ turn, np.where((angle != 0)[..., None], sizes / 2, half))
+    centre, axes, half = (tensor.numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
+    size, cuboid = scene.size.numpy(), scene.kind.numpy() == KINDS["cuboid"]
+    angle = np.where(cuboid, np.arctan2(size[..., LEAN], 2 * size[..., 0]), 0.0)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    length, depth = size[..., 0] / cosine + size[..., 1] * np.abs(sine), size[..., 1] * cosine
+    half = np.where(cuboid[..., None], np.stack([length, depth, half[..., 2]], -1), half)
+    cosine, sine = cosine[..., None], sine[..., None]
+    turned = axes[..., 0] * cosine + axes[..., 1] * sine, axes[..., 1] * cosine - axes[..., 0] * sine, axes[..., 2]
+    return Boxes(centre, np.stack(turned, -1), half)
 
 
 def boxes_around(sets: Sequence[Array], frames: FloatArray | None = None, floor: float = SURFACE.thin) -> Boxes:

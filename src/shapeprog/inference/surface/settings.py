@@ -34,7 +34,7 @@ class SurfaceSettings:
     simple: float = 0.5  # least share of its box that such a component fills: a ball fills .52
     off_box: float = 0.01  # difference of that share from one up to which it is a box
     # Difference of the shares of their boxes that a component and a primitive on it fill, at most; if they lean,
-    # ``off_box``: a splayed leg with level ends is no rod.
+    # ``off_box``, unless the primitive may be sheared: a splayed leg with level ends is no rod.
     off_fill: float = 0.1
     above: float = 0.01  # height above a face at which something in contact with it hides it
     nearest: int = 12  # neighbours of a point

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shapeprog.geometry.contacts import linked
 from shapeprog.geometry.separation import gaps, touching
-from shapeprog.inference.surface.components import linked
 from shapeprog.inference.ties.elements import Slot, boxes_of
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES

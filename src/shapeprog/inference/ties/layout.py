@@ -96,14 +96,16 @@ class Layout:
         self._offset = values[:, -1]
         # Rows (G, P) and lower bounds (G,) of their products with the numbers: no part may become thinner than
         # ``THINNEST``, and no rod less than half as long.
-        rods = [none[:-1] + self._along(line) for line in self._named if "end" in dict(line.keywords)]
+        rods = [self._along(line) for line in self._named if "end" in dict(line.keywords)]
         self.bounded: FloatArray = np.vstack([self.jacobian, *rods])
         shortest = [float(rod @ self.numbers) / 2 for rod in rods]
         self.low: FloatArray = np.append(self.tunable.low.numpy() - self._offset, shortest)
 
     def _along(self, line: Part | Group) -> FloatArray:
         """How the length of a rod along the axis that it runs along most follows from the numbers (P,)."""
-        ends = ([ends_of(line, key, axis, self._numbers, self._forms)[0] for axis in range(3)] for key in POINTS[::2])
+        ends = (
+            [ends_of(line, key, axis, self._numbers, self._forms)[0] for axis in range(3)] for key in ("start", "end")
+        )
         ways = np.array([end - start for start, end in zip(*ends, strict=True)])[:, :-1]
         lengths = ways @ self.numbers
         longest = np.abs(lengths).argmax()

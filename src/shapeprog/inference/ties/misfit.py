@@ -27,13 +27,11 @@ PRIOR: dict[Kind, float] = {"clearance": 2e-4, "offset": 2e-4, "length": 2e-4, "
 class Misfit:
     """How far the surface of a program is from that of a target, about its numbers; a refit keeps joints together.
 
-    Moves are those from ``start`` (P,), and ``minimum`` is the least weight (P,) of the square of each.
+    Moves are those from the numbers of the layout, and ``minimum`` is the least weight (P,) of the square of each.
     """
 
-    def __init__(
-        self, layout: Layout, evidence: Evidence, joints: Joints, start: FloatArray, minimum: FloatArray, seed: int
-    ) -> None:
-        self.layout, self.target, self.joints, self.start = layout, Target(evidence), joints, start
+    def __init__(self, layout: Layout, evidence: Evidence, joints: Joints, minimum: FloatArray, seed: int) -> None:
+        self.layout, self.target, self.joints = layout, Target(evidence), joints
         self.width = FIT.explained * evidence.tolerance
         self.generator = torch.Generator().manual_seed(seed)
         scale = np.maximum(layout.tunable.scale.numpy() @ np.abs(layout.jacobian), 1e-3)
@@ -64,12 +62,12 @@ class Misfit:
             slope = slope + (wide.T @ residual).numpy()
             curvature = curvature + (wide.T @ slopes).numpy()
         slope, curvature = slope + self.planes[0] + self.planes[1] @ numbers, curvature + self.planes[1]
-        return slope + self.prior * (numbers - self.start), curvature + np.diag(self.prior)
+        return slope + self.prior * (numbers - self.layout.numbers), curvature + np.diag(self.prior)
 
     def refitted(self, numbers: FloatArray, rows: FloatArray) -> FloatArray:
         """The numbers (P,) of the least misfit that differ from these only so that relations (M, P) hold as before.
 
-        A thickness that a step would take below its bound is fixed, and the step is solved again (an active set).
+        What a step would take below its bound is fixed, and the step is solved again (an active set).
         """
         farthest, bounded = TIES.farthest / self.reach, self.layout.bounded
         low = np.minimum(self.layout.low, bounded @ numbers) - HOLDS

@@ -84,7 +84,7 @@ def worthwhile(
     price
         Price of a number, in the unit of the misfit.
     low, bounded
-        Lower bounds (F,) of the products of these rows (F, V) with the numbers; no relation may violate them.
+        Lower bounds (G,) of the products of these rows (G, V) with the numbers; no relation may violate them.
     """
     rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
     imposed, free, axes, edges = list[FloatArray](), np.linalg.inv(curvature), rows[:0], 0

@@ -16,7 +16,7 @@ class TieSettings:
     price: float = 3e-4  # of a free number, as a mean squared distance
     known_price: float = 1.2e-3  # the same in a program that somebody wrote (planted programs), and of exact numbers
     known: float = 0.1  # weight of a squared move of a number that somebody wrote
-    extent: float = 0.3  # weight of a squared move of the width, depth or height from that of the mesh
+    extent: float = 0.3  # weight of a squared move of the width, depth or height of a mesh
     exact: float = 1.0  # weight of a squared move of a number in an exact program
 
     # A program is exact if of the relations that hold up to ``nearly`` this share holds up to ``exactly``, and this

@@ -84,7 +84,7 @@ def tie(
         assert tied.source is not None
         ties = _Ties(tied.source, evidence, seed, known=known, held=held)
         surface = cKDTree(evidence.surface, balanced_tree=False)  # faster to build
-        before, least = closeness(unroll(plain), surface, seed), math.inf
+        before, least = 0.0 if known else closeness(unroll(plain), surface, seed), math.inf
         for attempt in range(TIES.attempts):
             try:
                 offered = ties.tied(price * ties.price / TIES.cheaper**attempt)
@@ -121,7 +121,7 @@ class _Ties:
         minimum = np.where(self.fixed, 1e6, weight)
         if evidence.mesh is not None and not known:  # the size of a mesh is exact
             minimum[:3] = np.maximum(minimum[:3], TIES.extent)
-        self.misfit = Misfit(layout, evidence, joints, layout.numbers, minimum, seed)
+        self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
         self.zero = 0.0 if known else TIES.zero  # a distance that somebody wrote stays
 

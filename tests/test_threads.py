@@ -6,9 +6,10 @@ import importlib
 
 import pytest
 import torch
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from shapeprog.geometry import arrays
-from shapeprog.geometry.arrays import one_tensor_thread, over_threads
+from shapeprog.geometry.arrays import one_thread, over_threads
 
 
 @pytest.fixture(autouse=True)
@@ -27,16 +28,27 @@ def parts() -> int:
 
 
 def test_torch_has_one_thread_and_kernels_keep_theirs():
-    with one_tensor_thread():
+    with one_thread():
         assert (torch.get_num_threads(), parts()) == (1, 2)
-        with one_tensor_thread(kernels=1):
+        with one_thread(kernels=1):
             assert (torch.get_num_threads(), parts()) == (1, 1)
         assert (torch.get_num_threads(), parts()) == (1, 2)
     assert (torch.get_num_threads(), parts(), arrays._kernel_threads) == (2, 2, 0)
 
 
+def test_linear_algebra_has_one_thread_as_well():
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(2, user_api="blas"):
+        assert threads() == {2}
+        with one_thread(), one_thread(kernels=1):
+            assert threads() == {1}
+        assert threads() == {2}
+
+
 def test_the_number_of_threads_comes_back_after_an_error():
-    with pytest.raises(ZeroDivisionError), one_tensor_thread():
+    with pytest.raises(ZeroDivisionError), one_thread():
         raise ZeroDivisionError
     assert torch.get_num_threads() == 2
 

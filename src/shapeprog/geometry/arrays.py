@@ -68,7 +68,7 @@ _kernel_threads = 0  # threads that kernels run in; 0 for as many as torch has
 
 
 @contextmanager
-def one_tensor_thread(kernels: int = 0) -> Iterator[None]:
+def one_thread(kernels: int = 0) -> Iterator[None]:
     """Let torch and the linear algebra of NumPy compute in one thread within: idle threads would spin on the cores, and
     sums of several threads differ in their last digits from those of one.
 

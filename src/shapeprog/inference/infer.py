@@ -22,7 +22,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats.format import CELLS
 from shapeprog.formats.samples import occupied
-from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.geometry.arrays import one_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.inference.assembly import assemble
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
@@ -96,7 +96,7 @@ class Result:
         return importlib.import_module("shapeprog.view.page").png(self.program, self.scores)
 
 
-@one_tensor_thread()
+@one_thread()
 def infer(
     shape: Shape | str | Path,
     *,

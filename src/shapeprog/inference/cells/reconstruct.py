@@ -10,7 +10,7 @@ from torch import Tensor
 
 from shapeprog.data.shape import Shape
 from shapeprog.formats.samples import occupied
-from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.geometry.arrays import one_thread
 from shapeprog.geometry.cells import iou, pack
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
@@ -90,7 +90,7 @@ def refined(program: Program, target: Float[Tensor, "P 3"], *, seed: int = 0, de
     low, high = torch.maximum(tunable.low, values - REACH), values + REACH
     mean, square = torch.zeros_like(values), torch.zeros_like(values)
     generator = torch.Generator().manual_seed(seed)
-    with one_tensor_thread(kernels=1):
+    with one_thread(kernels=1):
         for step in range(STEPS):
             if deadline.passed(f"the refinement after {step} of {STEPS} steps"):
                 break

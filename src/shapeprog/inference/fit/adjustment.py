@@ -11,7 +11,7 @@ import math
 import torch
 
 from shapeprog.data.shape import Shape
-from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.geometry.arrays import one_thread
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.fit.joints import Joints, find_joints, joining, moved, needs
 from shapeprog.inference.fit.residuals import System, Target, of_target
@@ -62,7 +62,7 @@ def adjust(
     prior, farthest = weights * tunable.scale**2, 0.7 / tunable.scale  # a step moves the surface by up to .7 cells
     # The lowest points of scans are noise: the floor is a tolerance above them.
     floor = float(evidence.surface[:, 0].min()) + evidence.tolerance * (evidence.tolerance > SURFACE.tolerance)
-    with one_tensor_thread(kernels=1):
+    with one_thread(kernels=1):
         joints = find_joints(tunable.scene(values), floor)
         for step in range(steps):
             if deadline.passed(f"the adjustment after {step} of {steps} steps"):

@@ -16,7 +16,7 @@ import torch
 from scipy.spatial import cKDTree
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry.arrays import one_tensor_thread
+from shapeprog.geometry.arrays import one_thread
 from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.inference.candidates.drawings import solid_boxes
 from shapeprog.inference.fit.joints import find_joints
@@ -72,7 +72,7 @@ def tie(
     plain = Program(program.body) if known or held else between_ends(program)
     if not plain.size:
         return program
-    with one_tensor_thread(kernels=1):
+    with one_thread(kernels=1):
         try:
             whole = program.source if known else None
             corners = None if known or evidence.mesh is None else evidence.mesh.vertices

@@ -47,7 +47,7 @@ class TieSettings:
     # By how much a relation may be off
     within: float = 0.3  # lengths
     plane: float = 0.1  # planes of mirrors off the middle
-    degrees: float = 2.0  # angles; also of bars about themselves whose sides follow those of the whole
+    degrees: float = 6.0  # angles; also of bars about themselves whose sides follow those of the whole
     alike: float = 0.25  # equal sizes, as a share of the larger
     rounding: float = 0.05  # which is added to that
     section: float = 3.0  # sizes below this along different axes may be the two sides of one section

@@ -54,7 +54,7 @@ class Prices:
     free: float = 0.5  # of free space filled, in cells, over the same area
     statement: float = 0.005  # of a drawing statement or call
     loop: float = 0.002
-    number: float = 0.0005  # of every continuous number in the text
+    number: float = 0.0008  # of every continuous number in the text
     part: float = 0.003  # added for every part of a mesh, along the axes, that one primitive draws, 16 times at most
     outside: float = 0.02  # of reaching beyond the box around the target, such as a last copy that is too many
     close: float = 0.015  # added for the share of the target within half a tolerance, with nearly the same normal

@@ -30,6 +30,7 @@ from shapeprog.inference.choice.bits import WORD, BinnedPoints, Bits, by_word, c
 from shapeprog.inference.choice.coverage_kernels import charged
 from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.inference.surface.evidence import Evidence, off_parts
+from shapeprog.inference.surface.oriented import CORNERS
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Node, Program
@@ -56,7 +57,7 @@ class Prices:
     loop: float = 0.002
     number: float = 0.0008  # of every continuous number in the text
     part: float = 0.003  # added for every part of a mesh, along the axes, that one primitive draws, 16 times at most
-    outside: float = 0.02  # of reaching beyond the box around the target, such as a last copy that is too many
+    implausible: float = 0.02  # of reaching beyond the box around the target, as one copy too many; of overlapping ones
     close: float = 0.015  # added for the share of the target within half a tolerance, with nearly the same normal
 
     def of(self, program: Program) -> float:
@@ -131,7 +132,8 @@ class Coverage:
         evidence, prices = self.evidence, self.prices
         tied = centred(scene, candidates) + square(scene)
         price = np.array([prices.of(program) for program in candidates]) - prices.number * tied
-        price += prices.outside * (protrusion(scene, evidence) > SETTINGS.outside)
+        beyond = protrusion(scene, evidence) > SETTINGS.outside
+        price += prices.implausible * (beyond.astype(int) + overlapping(scene))
         explained, interior = covers(scene, self._points, evidence.tolerance, evidence.agreement)
         agreement = max(evidence.agreement, SETTINGS.agreement)
         near, deeper = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
@@ -177,6 +179,18 @@ def protrusion(scene: Scene, evidence: Evidence) -> FloatArray:
     low, high = evidence.surface.min(0), evidence.surface.max(0)
     beyond = np.maximum(low - (centre - reach), centre + reach - high).max(2)
     return np.where(scene.mask, beyond, 0.0).max(1, initial=0.0)
+
+
+def overlapping(scene: Scene) -> BoolArray:
+    """Whether copies of a candidate (B,) overlap, as do a board across the middle and its mirror image.
+
+    They do where another primitive contains a corner of half of the box around the first.
+    """
+    centre, rotation, half = (tensor.double().numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
+    corners = centre[:, :1, None] + 0.5 * CORNERS * half[:, :1, None] @ np.swapaxes(rotation[:, :1], 2, 3)
+    local = (corners - centre[:, 1:, None]) @ rotation[:, 1:]  # (B, N - 1, 8, 3)
+    copies = (scene.mask & (scene.block == scene.block[:, :1])).numpy()[:, 1:, None]  # a call may draw other blocks
+    return np.any((np.abs(local) <= half[:, 1:, None]).all(-1) & copies, (1, 2))
 
 
 def free_points(evidence: Evidence) -> tuple[FloatArray, float]:

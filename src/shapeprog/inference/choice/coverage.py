@@ -56,7 +56,7 @@ class Prices:
     statement: float = 0.005  # of a drawing statement or call
     loop: float = 0.002
     number: float = 0.0008  # of every continuous number in the text
-    part: float = 0.003  # added for every part of a mesh, along the axes, that one primitive draws, 16 times at most
+    part: float = 0.004  # added for every part of a mesh, along the axes, that one primitive draws, 16 times at most
     implausible: float = 0.02  # of reaching beyond the box around the target, as one copy too many; of overlapping ones
     close: float = 0.015  # added for the share of the target within half a tolerance, with nearly the same normal
 

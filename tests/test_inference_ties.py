@@ -857,6 +857,14 @@ def test_of_two_clearances_of_several_roles_the_larger_is_the_inner_one():
     }
 
 
+def test_a_sum_within_other_expressions_alone_is_named():
+    bar = "{role}(bar(start=at(rear=1, top=0), end=at(front=1), width=width - 2 * c, height=1))\n"
+    lines = parsed(bar.format(role="top") + bar.format(role="apron") + "leg(left=a, width=b)\nfoot(left=a, width=b)\n")
+    known = WHOLE | {"a": 2, "b": 0.5, "c": 1.5}
+    (total,) = values(parsed("leg(left=a - b)\n")[0])
+    assert named(lines, {"a": 2, "b": 0.5, "c": total}, known)["c"] == "board_width"
+
+
 def test_the_second_point_of_a_part_does_not_give_its_bottom():
     rod = "leg(rod(start=at({side}=a, rear=1), end=at({side}=5, rear=4, bottom=b), radius=1))\n"
     lines = parsed(rod.format(side="left") + rod.format(side="right"))

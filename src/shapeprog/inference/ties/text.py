@@ -118,7 +118,8 @@ def named(lines: Sequence[Line], wanted: Mapping[str, Value], numbers: dict[str,
     for provisional in wanted:
         number = numbers[provisional]
         uses = [use for use, value in every if value == Name(provisional)]
-        uses = uses or [use for use, value in every if provisional in names_in(_with(value, sums))]
+        # Else those of expressions with it, or with a sum of it.
+        uses = uses or [use for use, value in every if provisional in names_in(value) + names_in(_with(value, sums))]
         shared, own = _candidates(uses)
         further = _further([base for base in shared if base in FURTHER], number, taken)
         numbered = (f"{own[0]}_{count}" for count in range(2, len(wanted) + 2))

@@ -17,7 +17,7 @@ from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.inference.choice.bits import covers, pack, sorted_by_cell
 from shapeprog.inference.choice.choice import choose, explained, value
-from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices, shares
+from shapeprog.inference.choice.coverage import Coverage, CoverageTable, Prices, overlapping, shares
 from shapeprog.inference.choice.coverage_kernels import LIFT, TURNED
 from shapeprog.inference.surface import evidence as seen
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
@@ -140,6 +140,25 @@ def test_what_is_in_the_middle_writes_a_number_less(table, block, known):
     prices, program = Prices(), parse(block)
     (price,) = Coverage(table, prices).table([program]).prices
     assert price == pytest.approx(prices.of(program) - known * prices.number)
+
+
+@pytest.mark.parametrize(
+    ("block", "overlap"),
+    [
+        ("box(at=(0, 3, 4), size=(1, 2, 2))", False),
+        ("for i in mirror(side):\n    box(at=(0, 3, 4), size=(1, 2, 2))", False),
+        ("for i in mirror(side):\n    box(at=(0, -1, -3), size=(1, 2, 7))", True),  # across the middle
+        ("for i in mirror(side):\n    bar(start=(-6, 0, -7), end=(6, 0, 7), section=(1, 1))", False),  # a cross
+        ("for i in mirror(side):\n    bar(start=(0, 0, -7), end=(1, 0, 7), section=(8, 2))", True),
+        ("for i in translate(3, by=(0, 3, 0)):\n    box(at=(0, -6, -3), size=(1, 2, 7))", False),
+        ("for i in translate(3, by=(0, 1, 0)):\n    box(at=(0, -6, -3), size=(1, 2, 7))", True),
+    ],
+)
+def test_copies_that_overlap_are_implausible(table, block, overlap):
+    program = parse(block)
+    assert overlapping(unroll([program])).tolist() == [overlap]
+    with_price, without = (Coverage(table, prices).table([program]).prices for prices in (None, Prices(implausible=0)))
+    assert with_price - without == pytest.approx(overlap * Prices.implausible)
 
 
 def test_copies_of_a_loop_hide_each_other(table):

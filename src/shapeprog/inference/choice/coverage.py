@@ -187,10 +187,13 @@ def overlapping(scene: Scene) -> BoolArray:
     They do where another primitive contains a corner of half of the box around the first.
     """
     centre, rotation, half = (tensor.double().numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
-    corners = centre[:, :1, None] + 0.5 * CORNERS * half[:, :1, None] @ np.swapaxes(rotation[:, :1], 2, 3)
-    local = (corners - centre[:, 1:, None]) @ rotation[:, 1:]  # (B, N - 1, 8, 3)
-    copies = (scene.mask & (scene.block == scene.block[:, :1])).numpy()[:, 1:, None]  # a call may draw other blocks
-    return np.any((np.abs(local) <= half[:, 1:, None]).all(-1) & copies, (1, 2))
+    same = (scene.mask & (scene.block == scene.block[:, :1])).numpy()  # a call may draw other blocks
+    row, slot = np.nonzero(same & (np.arange(same.shape[1]) > 0))
+    first = np.zeros_like(slot)
+    corners = centre[row, first, None] + 0.5 * CORNERS * half[row, first, None] @ rotation[row, first].swapaxes(1, 2)
+    local = (corners - centre[row, slot, None]) @ rotation[row, slot]  # (copies, 8, 3)
+    inside = (np.abs(local) <= half[row, slot, None]).all(-1)
+    return np.isin(np.arange(len(same)), row[inside.any(-1)])
 
 
 def free_points(evidence: Evidence) -> tuple[FloatArray, float]:

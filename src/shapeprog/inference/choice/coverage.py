@@ -30,7 +30,7 @@ from shapeprog.inference.choice.bits import WORD, BinnedPoints, Bits, by_word, c
 from shapeprog.inference.choice.coverage_kernels import charged
 from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.inference.surface.evidence import Evidence, off_parts
-from shapeprog.inference.surface.oriented import CORNERS
+from shapeprog.inference.surface.oriented import Boxes
 from shapeprog.language.ast import Assignment, Comment
 from shapeprog.language.free import numbers_outside
 from shapeprog.language.program import Loop, Node, Program
@@ -189,10 +189,9 @@ def overlapping(scene: Scene) -> BoolArray:
     centre, rotation, half = (tensor.double().numpy() for tensor in (scene.centre, scene.rotation, scene.bounds))
     same = (scene.mask & (scene.block == scene.block[:, :1])).numpy()  # a call may draw other blocks
     row, slot = np.nonzero(same & (np.arange(same.shape[1]) > 0))
-    first = np.zeros_like(slot)
-    corners = centre[row, first, None] + 0.5 * CORNERS * half[row, first, None] @ rotation[row, first].swapaxes(1, 2)
-    local = (corners - centre[row, slot, None]) @ rotation[row, slot]  # (copies, 8, 3)
-    inside = (np.abs(local) <= half[row, slot, None]).all(-1)
+    first = row, np.zeros_like(row)
+    inner = Boxes(centre[first], rotation[first], half[first] / 2).corners()  # (copies, 8, 3)
+    inside = (np.abs((inner - centre[row, slot, None]) @ rotation[row, slot]) <= half[row, slot, None]).all(-1)
     return np.isin(np.arange(len(same)), row[inside.any(-1)])
 
 

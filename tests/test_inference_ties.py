@@ -17,6 +17,7 @@ import shapeprog as sp
 from benchmarks.editing import edit_scores, multiplied
 from shapeprog.cli.app import app
 from shapeprog.geometry.mesh import pieces, union_mesh
+from shapeprog.inference.candidates.drawings import between_ends
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties import tying
@@ -29,7 +30,7 @@ from shapeprog.inference.ties.misfit import Misfit, closeness
 from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import named
-from shapeprog.inference.ties.tying import between_ends, tie
+from shapeprog.inference.ties.tying import tie
 from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
@@ -131,13 +132,13 @@ drawer(box(at=(3, -7, -5.96), size=(2, 13, 12)))
 
 
 def test_what_is_off_the_middle_by_hundredths_is_symmetric_however_it_is_edited():
-    program = sp.parse(BENCH.format(rear=6.92))
+    program = between_ends(sp.parse(BENCH.format(rear=6.92)))
     tied = tie(program, evidence_of_program(program))
     assert edit_scores(tied).symmetry == 1
     assert (unroll(tied).centre[-2:, 2].abs() < 1e-4).all()
     back = next(node for node in tied.walk() if node.name == "beam")  # upwards: both ends are in the middle
     assert back.values[2] == back.values[5] == pytest.approx(0, abs=1e-4)
-    askew = sp.parse(BENCH.format(rear=5.5))
+    askew = between_ends(sp.parse(BENCH.format(rear=5.5)))
     one, other = rear_ends(tie(askew, evidence_of_program(askew)))
     assert other - one == pytest.approx(1.5, abs=0.2)
 
@@ -355,7 +356,7 @@ def test_a_board_that_leans_a_little_stays_a_board():
 
 
 def test_a_rail_stays_on_a_back_that_leans_when_the_chair_grows():
-    program = sp.parse(LEANING)
+    program = between_ends(sp.parse(LEANING))
     tied = tie(program, evidence_of_program(program))
     for height in (16, 24):
         scene = unroll(sp.set(tied, height=height))
@@ -566,7 +567,7 @@ door(left=3, width=2.5, front=0, depth=0.5, bottom=8.97, height=4)
 
 def tied_text(text: str) -> str:
     program = sp.parse(text)
-    return format_program(tie(program, evidence_of_program(program)))
+    return format_program(tie(between_ends(program), evidence_of_program(program)))
 
 
 def test_faces_are_measured_from_the_side_that_keeps_them_in_contact():

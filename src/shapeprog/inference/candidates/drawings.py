@@ -14,14 +14,14 @@ from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.candidates.settings import SETTINGS
-from shapeprog.language.hints import Box
-from shapeprog.language.parameters import Parameter
+from shapeprog.language.hints import Box, bar_along
+from shapeprog.language.parameters import Parameter, to_float32
 from shapeprog.language.printer import numbers_written
 from shapeprog.language.program import Draw, Node, Program, nest
 from shapeprog.language.statement import END, Statement, language
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
-from shapeprog.space import HALF, Array, FloatArray
+from shapeprog.space import HALF, SIDE, UP, Array, FloatArray
 
 
 def is_unhinted(declared: Statement) -> bool:
@@ -109,6 +109,38 @@ def canonical_side(program: Program) -> Program:
             images = drawings(Box(sign * box.centre, turn, box.half), draws[index].name)
             draws[index] = next(iter(_drawing_the_same(draws[index], images, sign.tolist())), draws[index])
     return redrawn_by(program, draws)
+
+
+def between_ends(program: Program) -> Program:
+    """The program with nearly upright parts as boxes, and boards that lean as bars between the middles of their ends.
+
+    A board is given by its lower edge and its angle; its upper edge is not linear in these numbers, so nothing could be
+    tied to it.  A panel that leans sideways is a bar upwards, without a turn about itself.
+    """
+    return redrawn_by(program, map(_between_ends, program.draws))
+
+
+def _between_ends(draw: Draw) -> Draw:
+    if draw.name not in ("board", "bar"):
+        return draw
+    name, values = draw.name, [*draw.values]
+    ((box,),) = solid_boxes([draw])
+    main = np.abs(box.rotation).argmax(0)  # the axes of the grid that its own run along most
+    off = box.half * np.linalg.norm(np.where(main == np.arange(3)[:, None], 0.0, box.rotation), axis=0)
+    rising, side = (int(np.abs(box.rotation[axis]).argmax()) for axis in (UP, SIDE))
+    if off.max() < SETTINGS.upright and len({*main}) == 3:
+        half = box.half[np.argsort(main)]
+        name, values = "box", [*(box.centre - half), *(2 * half)]
+    elif abs(values[-1]) < SETTINGS.leaning:
+        return draw
+    elif name == "bar":
+        upwards = bar_along(box, rising)
+        if box.half[rising] > box.half.min() and abs(upwards[-1]) < SETTINGS.leaning:
+            values = [*upwards[:-1], 0.0]
+    elif abs(box.centre[SIDE]) <= SETTINGS.board_off or 2 * box.half[side] <= SETTINGS.board_wide:
+        long = int(np.where(np.arange(3) == side, 0.0, box.half).argmax())
+        name, values = "bar", [*bar_along(box, long)[:-1], 0.0]
+    return Draw(name, tuple(map(to_float32, values)), draw.role)
 
 
 def redrawn_by(program: Program, draws: Iterable[Draw]) -> Program:

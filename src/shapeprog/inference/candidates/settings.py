@@ -36,6 +36,12 @@ class Settings:
     alike: float = 0.06  # difference of extents, as a share of the size, up to which candidates are copies
     level: float = 0.15  # the same of distances
 
+    # Upright and leaning boards
+    upright: float = 0.12  # largest distance of the ends of an upright part from its axis
+    leaning: float = 1.0  # angle in degrees from which a board is written as a bar, which has no left and right side,
+    board_off: float = 0.5  # if it is off the middle by no more than this
+    board_wide: float = 12.0  # or is no wider than this
+
     # Runs of copies
     stray: float = 0.35  # largest deviation of a copy from its expected position
     least_step: float = 0.4

@@ -90,10 +90,6 @@ class TieSettings:
     zero: float = 0.015  # distances up to this are no numbers
     negative: float = 1.5  # operators that a size is worth which may become negative: a difference
     repeated: float = 0.1  # operators that every use of a sum after the first is worth, as it can be named
-    upright: float = 0.12  # cells by which the ends of an upright part may be off its axis
-    leaning: float = 1.0  # angle from which a board is written as a bar, which has no left and right side,
-    board_off: float = 0.5  # if it is off the middle by no more than this
-    board_wide: float = 12.0  # or is no wider than this
     thin: float = 0.6  # the thickness of a part is at most this share of its next longer side
 
 

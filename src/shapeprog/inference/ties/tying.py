@@ -18,7 +18,6 @@ from scipy.spatial import cKDTree
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_thread
 from shapeprog.geometry.mesh import pieces_of_parts
-from shapeprog.inference.candidates.drawings import solid_boxes
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.fit.tunable import CELLS, DEGREES
 from shapeprog.inference.surface.evidence import Evidence, off_parts
@@ -29,15 +28,14 @@ from shapeprog.inference.ties.misfit import Misfit, closeness
 from shapeprog.inference.ties.relations import Relation, relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
-from shapeprog.language.ast import Draw, Fault, Line, Source, changed_lines
+from shapeprog.language.ast import Fault, Source
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.hints import bar_along
 from shapeprog.language.merging import merged
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import SIDE, UP, FloatArray
+from shapeprog.space import FloatArray
 
 
 def tie(
@@ -69,7 +67,7 @@ def tie(
     held
         Indices of the nodes of its body whose numbers stay fixed: calls of functions draw them.
     """
-    plain = Program(program.body) if known or held else between_ends(program)
+    plain = Program(program.body)
     if not plain.size:
         return program
     with one_thread(kernels=1):
@@ -178,35 +176,3 @@ class _Ties:
                 break
             numbers = self.misfit.refitted(optimum, rows)
         return carried(solved(layout.slots, rows), layout, numbers)
-
-
-def between_ends(program: Program) -> Program:
-    """The same parts, nearly upright ones as boxes, and boards that lean as bars between the middles of their ends.
-
-    A board is given by its lower edge and its angle; its upper edge is not linear in these numbers, so nothing could be
-    tied to it.  A panel that leans sideways is a bar upwards, without a turn about itself.
-    """
-    return Program(changed_lines(program.body, _between_ends))  # type: ignore[arg-type]
-
-
-def _between_ends(node: Line) -> Line:
-    if not isinstance(node, Draw) or node.name not in ("board", "bar"):
-        return node
-    name, values = node.name, [*node.values]
-    ((box,),) = solid_boxes([node])
-    main = np.abs(box.rotation).argmax(0)  # the axes of the grid that its own run along most
-    off = box.half * np.linalg.norm(np.where(main == np.arange(3)[:, None], 0.0, box.rotation), axis=0)
-    rising, side = (int(np.abs(box.rotation[axis]).argmax()) for axis in (UP, SIDE))
-    if off.max() < TIES.upright and len({*main}) == 3:
-        half = box.half[np.argsort(main)]
-        name, values = "box", [*(box.centre - half), *(2 * half)]
-    elif abs(values[-1]) < TIES.leaning:
-        return node
-    elif name == "bar":
-        upwards = bar_along(box, rising)
-        if box.half[rising] > box.half.min() and abs(upwards[-1]) < TIES.leaning:
-            values = [*upwards[:-1], 0.0]
-    elif abs(box.centre[SIDE]) <= TIES.board_off or 2 * box.half[side] <= TIES.board_wide:
-        long = int(np.where(np.arange(3) == side, 0.0, box.half).argmax())
-        name, values = "bar", [*bar_along(box, long)[:-1], 0.0]
-    return Draw(name, tuple(map(to_float32, values)), node.role)

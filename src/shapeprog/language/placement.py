@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+from shapeprog.language.ast import Group, Keywords, Part, Point
+from shapeprog.language.expression import value_at
+
 
 class AxisWords(NamedTuple):
     """The keywords of one axis: its low and high side, the size along it, and the offset of the centre."""
@@ -138,3 +141,38 @@ def coordinate_of(axis: int, given: Mapping[str, Any], low: Any, high: Any, defa
     if words.offset in given:
         return (low + high) / 2 + given[words.offset]
     return default if default is not None else low if axis == 2 else (low + high) / 2
+
+
+def ends_of(
+    line: Part | Group, key: str, axis: int, numbers: Mapping[str, float], forms: Mapping[str, Any] | None = None
+) -> tuple[Any, Any]:
+    """The low and high coordinate along an axis of what a line places in the whole, from the low side of that.
+
+    Parameters
+    ----------
+    line
+        A part or loop.
+    key
+        A keyword that takes a point; ``plane`` or ``centre`` of a loop; ``across`` for the size of a bar; else empty,
+        for the box of the part.
+    axis
+        0 left-right, 1 front-rear, 2 vertical.
+    numbers
+        The values of all names, among them the sizes of the whole.
+    forms
+        What the result is computed from in place of the values, for example linear forms.
+    """
+    keywords, values = dict(line.keywords), numbers if forms is None else forms
+    point = keywords.get(key)
+    pairs: Keywords = point.keywords if isinstance(point, Point) else line.keywords
+    given = {word: value_at(value, values) for word, value in pairs if word in AXES[axis]}  # type: ignore[arg-type]
+    sides = 0.0, values[SIZES[axis]]
+    if key in ("", "across"):
+        if "radius" in keywords and axis < 2:
+            radii = keywords["radius"] if isinstance(keywords["radius"], tuple) else (keywords["radius"],)
+            largest = max(radii, key=lambda radius: value_at(radius, numbers))
+            given[SIZES[axis]] = 2 * value_at(largest, values)  # type: ignore[arg-type]
+        return interval_of(axis, given, *sides)
+    start = ends_of(line, "start", axis, numbers, forms)[0] if key in ("through", "end") else None
+    coordinate = coordinate_of(axis, given, *sides, start)
+    return coordinate, coordinate

@@ -7,14 +7,10 @@ from an anchor, the low side, the middle or the high side of the whole, see :mod
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import OrientedBoxes
-from shapeprog.language.ast import Group, Keywords, Part, Point
-from shapeprog.language.expression import value_at
-from shapeprog.language.placement import AXES, SIZES, coordinate_of, interval_of
 
 LOW, MIDDLE, HIGH = 0, 1, 2  # anchors
 
@@ -55,30 +51,6 @@ class Slot(NamedTuple):
     kind: Kind
     axis: int  # 0, 1 or 2, else -1
     value: float  # in the unit of the text, or in degrees
-
-
-def ends_of(
-    line: Part | Group, key: str, axis: int, numbers: Mapping[str, float], forms: Mapping[str, Any] | None = None
-) -> tuple[Any, Any]:
-    """The low and high coordinate of an element, see :class:`Element`, from the low side of the whole.
-
-    Expressions are evaluated with the values of all names in ``numbers``.  With ``forms``, the result is computed from
-    these objects in place of the values, for example from linear forms.
-    """
-    keywords, values = dict(line.keywords), numbers if forms is None else forms
-    point = keywords.get(key)
-    pairs: Keywords = point.keywords if isinstance(point, Point) else line.keywords
-    given = {word: value_at(value, values) for word, value in pairs if word in AXES[axis]}  # type: ignore[arg-type]
-    sides = 0.0, values[SIZES[axis]]
-    if key in ("", "across"):
-        if "radius" in keywords and axis < 2:
-            radii = keywords["radius"] if isinstance(keywords["radius"], tuple) else (keywords["radius"],)
-            largest = max(radii, key=lambda radius: value_at(radius, numbers))
-            given[SIZES[axis]] = 2 * value_at(largest, values)  # type: ignore[arg-type]
-        return interval_of(axis, given, *sides)
-    start = ends_of(line, "start", axis, numbers, forms)[0] if key in ("through", "end") else None
-    coordinate = coordinate_of(axis, given, *sides, start)
-    return coordinate, coordinate
 
 
 def boxes_of(scene: Scene) -> OrientedBoxes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -11,12 +12,13 @@ from torch import Tensor
 
 from shapeprog.geometry.scene import Scene
 from shapeprog.inference.fit.tunable import Poses, Tunable
-from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, ElementKind, Key, Kind, Slot, ends_of
+from shapeprog.inference.ties.elements import HIGH, LOW, MIDDLE, Anchors, Element, ElementKind, Key, Kind, Slot
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Argument, Assignment, Group, Line, Part, Point, Source, changed_lines
+from shapeprog.language.convert.divisions import divided
 from shapeprog.language.evaluate import expanded, symbolic
 from shapeprog.language.expression import Name, Value
-from shapeprog.language.placement import AXES, BOX, POINTS, ROUND, SIZES, axis_of
+from shapeprog.language.placement import AXES, POINTS, ROUND, SIZES, ends_of
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray
 
@@ -45,6 +47,7 @@ class Layout:
 
     def __init__(self, source: Source, anchors: Mapping[Key, Anchors] | None = None, *, divide: bool = True) -> None:
         self._numbers: dict[str, float] = source.evaluated_numbers()  # by name, at the start
+        division = partial(divided, numbers=self._numbers, touch=TIES.touch, gap=TIES.gap)
         drawing: list[Line] = []
         for line in source.lines:
             match line:
@@ -52,10 +55,10 @@ class Layout:
                     # Each may become a division, or move into a box, alone; the text joins other mirrors again.
                     alone = [replace(line, body=(inner,)) for inner in body]
                     middle = {*keywords} <= {("x", 0.0), ("y", 0.0)}
-                    drawing += alone if middle or any(self._divisions(each) is not each for each in alone) else [line]
+                    drawing += alone if middle or any(division(each) is not each for each in alone) else [line]
                 case Part() | Group():
                     drawing.append(line)
-        tree = changed_lines(changed_lines(drawing, self._divisions) if divide else drawing, self._with_radius)
+        tree = changed_lines(changed_lines(drawing, division) if divide else drawing, self._with_radius)
         # The parts and loops, in the order of the text, and the words of parts by the number of their line.  A division
         # stands for its part.
         self.lines = [line for line in Source(tree).walk() if isinstance(line, Part | Group)]
@@ -100,6 +103,10 @@ class Layout:
         self.bounded: FloatArray = np.vstack([self.jacobian, *rods])
         shortest = [float(rod @ self.numbers) / 2 for rod in rods]
         self.low: FloatArray = np.append(self.tunable.low.numpy() - self._offset, shortest)
+        # Between these (2, G) relations may change them: the misfit is quadratic in small moves alone.
+        far = [np.inf if kind == "angle" else TIES.moved for kind in self.tunable.kinds] + [np.inf] * len(rods)
+        start = self.bounded @ self.numbers
+        self.limits: tuple[FloatArray, FloatArray] = np.maximum(self.low, start - far), start + far
 
     def _along(self, line: Part | Group) -> FloatArray:
         """How the length of a rod along the axis that it runs along most follows from the numbers (P,)."""
@@ -151,35 +158,6 @@ class Layout:
     def _divided(self, index: int) -> bool:
         """Whether a line is a part that fills a division; the division has the box of the part, and stands for it."""
         return self.lines[index - 1].kind == "divide"
-
-    def _divisions(self, line: Line) -> Line:
-        """A row of neighbours, or a part beside its mirror image, as the division of a box."""
-        match line:
-            case Group("translate", keywords, (Part("box" | "cushion") as part,), float(count)) if count > 1:
-                ways = ((axis_of(word), (count - 1) * float(step)) for word, step in keywords)  # type: ignore[arg-type]
-                moving = [(axis, way) for axis, way in ways if abs(way) >= TIES.touch]
-            case Group("translate", _, (Group("translate") as row,)):  # rows may be nested in either order
-                outer = self._divisions(replace(line, body=row.body))
-                return replace(row, body=(outer,)) if isinstance(outer, Group) and outer.kind == "divide" else line
-            case Group("mirror", ((word, _),), (Part("box" | "cushion") as part,)) if axis_of(word) < 2:
-                axis, count = axis_of(word), 2.0
-                plane, _ = ends_of(line, "plane", axis, self._numbers)
-                moving = [(axis, 2 * plane - sum(ends_of(part, "", axis, self._numbers)))]
-            case _:
-                return line
-        given = dict(part.keywords)
-        if len(moving) != 1 or not given.keys().isdisjoint({"tilt", "lean"}):
-            return line
-        ((axis, away),) = moving
-        words, (low, high) = AXES[axis], ends_of(part, "", axis, self._numbers)
-        size = high - low
-        gap = abs(away) / (count - 1) - size
-        if not -TIES.touch < gap <= TIES.gap * size:
-            return line
-        box = {word: value for word, value in given.items() if word in BOX and word not in words}
-        box |= {words.low: low + min(away, 0.0), words.size: size + abs(away)}
-        part = replace(part, keywords=tuple(pair for pair in part.keywords if pair[0] not in BOX))
-        return Group("divide", (*box.items(), ("gap", gap)), (part,), count, "xyz"[axis])
 
     def _with_radius(self, line: Line) -> Line:
         """An upright round part with a radius in place of a width and depth; a cylinder that fills the whole has these

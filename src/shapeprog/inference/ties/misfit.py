@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from scipy.spatial import cKDTree
 
-from shapeprog.geometry.distance import signed_distance
-from shapeprog.geometry.scene import Scene
-from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.fit.joints import Joints, moved, needs
 from shapeprog.inference.fit.planes import faces_of
 from shapeprog.inference.fit.residuals import Target, of_target
@@ -83,17 +79,3 @@ class Misfit:
                 rows = np.vstack([rows, bounded[thin]])
             numbers = onwards
         return numbers
-
-
-def closeness(scene: Scene, surface: cKDTree, seed: int) -> float:
-    """The F-score of the surfaces of a scene and of a target: how much of each lies near the other.
-
-    The squared misfit assumes that points are assigned to the right parts.  For thin parts and sheets they may not be;
-    the misfit can then fall while a part leaves its surface.  The points of both are the same for the same seed.
-    """
-    reach = TIES.near * float(np.linalg.norm(surface.maxes - surface.mins))
-    points = torch.from_numpy(surface.data[np.random.default_rng(seed).integers(0, surface.n, TIES.points)])
-    recall = float((signed_distance(scene, points).abs() <= reach).double().mean())
-    sample = sample_surface(scene, TIES.points, torch.Generator().manual_seed(seed))
-    precision = float(np.isfinite(surface.query(sample.points.numpy(), distance_upper_bound=reach)[0]).mean())
-    return 2 * precision * recall / (precision + recall) if precision + recall else 0.0

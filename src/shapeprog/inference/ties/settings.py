@@ -29,10 +29,8 @@ class TieSettings:
 
     # Rounds
     rounds: int = 3  # most searches for relations: first contacts and parts on the floor, then all
-    lost: float = 0.03  # largest decrease of closeness when numbers are tied
-    cheaper: float = 3.0  # divides the price of a number where more is lost
-    attempts: int = 3  # most prices
-    repeats: int = 6  # most times at one price that parts are tied which come apart,
+    moved: float = 0.8  # largest change in cells by which relations may move a number of a drawing statement
+    repeats: int = 6  # most times that parts are tied which come apart,
     heavier: float = 10.0  # each time with so many times the weight of their joints
 
     # Price of the number that a relation saves, as a multiple of the usual price.  All others have the usual price:
@@ -83,8 +81,6 @@ class TieSettings:
     steps: int = 4  # of Gauss and Newton in a refit
     together: float = 0.03  # weight of a squared gap between parts that touched
     farthest: float = 0.5  # that one step moves a number
-    points: int = 4_000  # of the target, and of the program, whose closeness is compared
-    near: float = 0.01  # share of the diagonal of the target within which surfaces are close, as in the evaluation
 
     # Text
     zero: float = 0.015  # distances up to this are no numbers

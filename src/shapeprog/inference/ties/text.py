@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.inference.ties.elements import ends_of
 from shapeprog.inference.ties.expressions import Solution
 from shapeprog.inference.ties.groups import grouped, simplified
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Assignment, Group, Line, Part, Point, Source, changed_lines, changed_values, values
 from shapeprog.language.expression import Expression, Linear, Name, Value, names_in, replaced
-from shapeprog.language.placement import RESERVED, SIZES
+from shapeprog.language.placement import RESERVED, SIZES, ends_of
 from shapeprog.language.statement import language
 from shapeprog.space import FloatArray
 

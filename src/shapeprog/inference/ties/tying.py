@@ -13,7 +13,6 @@ from collections.abc import Collection
 
 import numpy as np
 import torch
-from scipy.spatial import cKDTree
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_thread
@@ -24,17 +23,16 @@ from shapeprog.inference.surface.evidence import Evidence, off_parts
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.expressions import DISTANCES, Solution, carried, solved
 from shapeprog.inference.ties.layout import Layout
-from shapeprog.inference.ties.misfit import Misfit, closeness
+from shapeprog.inference.ties.misfit import Misfit
 from shapeprog.inference.ties.relations import Relation, relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
-from shapeprog.language.ast import Fault, Source
+from shapeprog.language.ast import Source
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import merged
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
-from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
 
@@ -67,33 +65,20 @@ def tie(
     held
         Indices of the nodes of its body whose numbers stay fixed: calls of functions draw them.
     """
-    plain = Program(program.body)
-    if not plain.size:
+    if not program.size:
         return program
+    whole = program.source if known else None
+    corners = None if known or evidence.mesh is None else evidence.mesh.vertices
+    box = None if corners is None else (corners.min(0), corners.max(0))
+    given = Program(program.body) if held else merged(Program(program.body))
     with one_thread(kernels=1):
         try:
-            whole = program.source if known else None
-            corners = None if known or evidence.mesh is None else evidence.mesh.vertices
-            box = None if corners is None else (corners.min(0), corners.max(0))
-            given = plain if held else merged(plain)
-            tied = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box)
-        except ShapeProgError:  # a statement without a placed form
+            source = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box).source
+            assert source is not None
+            ties = _Ties(source, evidence, seed, known=known, held=held)
+            return ties.tied(price * ties.price)
+        except ShapeProgError:  # a statement without a placed form, or relations left a part without length
             return program
-        assert tied.source is not None
-        ties = _Ties(tied.source, evidence, seed, known=known, held=held)
-        surface = cKDTree(evidence.surface, balanced_tree=False)  # faster to build
-        before, least = 0.0 if known else closeness(unroll(plain), surface, seed), math.inf
-        for attempt in range(TIES.attempts):
-            try:
-                offered = ties.tied(price * ties.price / TIES.cheaper**attempt)
-            except Fault:  # relations left a part without length
-                continue
-            lost = 0.0 if known else before - closeness(unroll(offered), surface, seed)
-            if lost < least:
-                tied, least = offered, lost
-            if lost <= TIES.lost:
-                break
-    return tied
 
 
 class _Ties:
@@ -170,8 +155,7 @@ class _Ties:
                 if (step or early) and not relation.row[self.fixed].any():
                     candidates.append(relation)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            low, bounded = layout.low, layout.bounded
-            rows, optimum = worthwhile(candidates, numbers, curvature, price, low=low, bounded=bounded)
+            rows, optimum = worthwhile(candidates, numbers, curvature, price, layout.bounded, layout.limits)
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)

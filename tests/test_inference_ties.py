@@ -650,11 +650,13 @@ def test_long_parts_span_and_short_ones_keep_their_size(end: float, expected: tu
 
 
 def test_a_symmetric_rod_goes_with_the_parts_that_it_joins():
-    legs = "for _ in mirror(x=0):\n    leg(left=6.5, width=1, y=0, depth=1)\n"
+    legs = "for _ in mirror(x=0):\n    leg({}, width=1, y=0, depth=1)\n"
     rod = "stretcher(rod(start=at(x=-4.5, y=0.3, bottom=2), end=at(x=4.5), radius=0.4))\n"
-    program = placed(sp.parse(f"width, depth, height = 24, 6, 8\ntop(top=0, height=1)\n{legs}{rod}"))
-    found = anchors_of(Layout(program.source))
-    assert (found[3, "start", 0], found[3, "end", 0]) == ((0,), (2,))
+    found = []
+    for place in ("left=6.5", "left=0"):
+        text = f"width, depth, height = 24, 6, 8\ntop(top=0, height=1)\n{legs.format(place)}{rod}"
+        found.append(anchors_of(Layout(placed(sp.parse(text)).source)))
+    assert [(of[3, "start", 0], of[3, "end", 0]) for of in found] == [((0,), (2,)), ((1,), (1,))]
 
 
 def test_a_round_part_that_fills_the_whole_gives_it_one_diameter():

@@ -37,13 +37,19 @@ class _AxisAnchors:
         index = {(element.line, element.key): k for k, element in enumerate(self.elements)}
         self.rows = {k: index[layout.first(line)] for (line, key), k in index.items() if key == "last"}
         self.choices: list[Sequence[Anchors]] = [self._choices(element) for element in self.elements]
-        # Ends of rods, with the cost of different anchors.
+        # Ends of rods, with the cost of different anchors; those of a symmetric rod mirror the choice of its start.
         self.spans: dict[tuple[int, int], float] = {}
+        self.chosen_by = np.arange(len(self.elements))
         for (line, key), end in index.items():
             if key in ("end", "through"):
                 pair = index[line, "start"], end
-                length = abs(self.elements[pair[0]].low - self.elements[end].low)
-                self.spans[pair] = TIES.resized * max(0.0, 1 - length / (TIES.spanning * self.extent))
+                left, right = sorted(pair, key=lambda k: self.elements[k].low)
+                low, high = self.elements[left].low, self.elements[right].low
+                if axis < 2 and abs(low + high - self.extent) < 2 * TIES.off_middle * self.extent:
+                    self.choices[left], self.choices[right] = ([(MIDDLE,), (side,)] for side in (LOW, HIGH))
+                    self.spans = {other: cost for other, cost in self.spans.items() if pair[0] not in other}
+                    self.chosen_by[end] = pair[0]
+                self.spans[pair] = TIES.resized * max(0.0, 1 - (high - low) / (TIES.spanning * self.extent))
         count, most = len(self.elements), max(map(len, self.choices), default=1)
         self.costs = np.full((count, most), np.inf)
         # By which share of the growth of the whole low and high ends move.
@@ -58,6 +64,8 @@ class _AxisAnchors:
                 moves[2 * k + 1 : 2 * k + 3, layout.index[element.line, AXES[axis].size]] = -1, 1
             if element.key != "across":
                 moves[2 * k + 1, layout.index[element.line, f"{element.key}.{AXES[axis].low}".lstrip(".")]] = 1
+        images = np.flatnonzero(self.chosen_by != np.arange(count))
+        self.costs[np.append(images, self.chosen_by[images]), :2] = 0.0
         # What the boxes follow from (Q = 2 + 2 K): from one, which gives them at the start, from growth of the whole
         # while all coordinates stay, as mirror images move with its high side, and from moves of the ends of elements.
         moved = (layout.values(layout.numbers + way * moves) for way in (-STEP, STEP))
@@ -129,7 +137,7 @@ class _AxisAnchors:
         # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
         if len(self.leaning) and self._costs(best[None], exact=True) >= TIES.separated:
             _, best = self._descent(best, exact=True)
-        return [choices[k] for choices, k in zip(self.choices, best, strict=True)]
+        return [choices[k] for choices, k in zip(self.choices, best[self.chosen_by], strict=True)]
 
     def _descent(self, state: Array, *, exact: bool = False) -> tuple[float, Array]:
         """The cost and state (K,) from which no change of an element is cheaper."""
@@ -146,7 +154,7 @@ class _AxisAnchors:
 
     def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K); for ``exact`` see :meth:`_gaps`."""
-        elements, growth = np.arange(states.shape[1]), TIES.growth * self.extent
+        states, elements, growth = states[:, self.chosen_by], np.arange(states.shape[1]), TIES.growth * self.extent
         shifts, cost = self.shifts[elements, states], self.costs[elements, states].sum(1)  # (S, K, 2), (S,)
         for (start, end), penalty in self.spans.items():
             cost += penalty * (shifts[:, start, 0] != shifts[:, end, 0])

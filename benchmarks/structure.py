@@ -141,6 +141,7 @@ def measure(task: Task) -> dict[str, Any]:
 def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
     """The program of an object, and its whole-numbered form where it has one."""
     from shapeprog.inference import infer
+    from shapeprog.inference.candidates.drawings import between_ends
     from shapeprog.inference.surface.evidence import evidence_of
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.merging import merged
@@ -148,7 +149,7 @@ def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
 
     if task.method == "tied":
         evidence = evidence_of(shape, task.seed)
-        tied = tie(parse(task.program), evidence, price=task.price, seed=task.seed)
+        tied = tie(between_ends(parse(task.program)), evidence, price=task.price, seed=task.seed)
         return merged(tied), None
     statements: Literal["all", "paper"] = "paper" if task.method == "paper" else "all"
     ties = task.method != "untied"

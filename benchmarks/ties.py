@@ -119,6 +119,7 @@ def measure(task: Task) -> dict[str, Any]:
 def of_furniture(task: Task) -> dict[str, Any]:
     """How many ties of a planted program are found again."""
     from shapeprog.data.synthetic.furniture import furniture
+    from shapeprog.inference.candidates.drawings import between_ends
     from shapeprog.inference.surface.evidence import evidence_of_program
     from shapeprog.inference.ties.tying import tie
     from shapeprog.language.free import free_numbers
@@ -128,7 +129,8 @@ def of_furniture(task: Task) -> dict[str, Any]:
     noisy = with_noise(planted, np.random.default_rng((task.seed, task.number)))
     evidence = evidence_of_program(planted if task.set == "fitted" else noisy, task.seed)
     started = time.process_time()
-    tied = tie(noisy, evidence, known=task.set == "alone", seed=task.seed)
+    known = task.set == "alone"
+    tied = tie(noisy if known else between_ends(noisy), evidence, known=known, seed=task.seed)
     seconds = time.process_time() - started
     drawn, plain, ways = redrawn(task.number, task.seed), plain_slopes(planted), slopes(tied, planted)
     written = relations_written(len(plain))

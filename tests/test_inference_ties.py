@@ -19,6 +19,7 @@ from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.candidates.drawings import between_ends
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.surface.evidence import evidence_of_program
+from shapeprog.inference.ties import layout as layouts
 from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.elements import Slot
@@ -30,7 +31,7 @@ from shapeprog.inference.ties.relations import Relation, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import named
 from shapeprog.inference.ties.tying import tie
-from shapeprog.language.ast import Assignment, Group, Line, Part, values
+from shapeprog.language.ast import Assignment, Comment, Fault, Group, Line, Part, values
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import names_in
@@ -500,20 +501,34 @@ def test_an_overhang_that_is_the_same_on_all_sides_is_one_number():
     assert free[0.54] == free[1.54] - 1
 
 
-@pytest.mark.parametrize("price", [1.0, 1000.0])
-def test_ties_move_no_part_far_whatever_a_number_is_worth(price: float):
-    program = sp.parse(
-        dedent("""
-        for i in mirror(side):
-            side(box(at=(-12, -4, 11.85), size=(24, 8, 0.15)))
-        for i in translate(5, by=(5.6, 0, 0)):
-            shelf(box(at=(-11.7, -3.9, -11.85), size=(0.5, 7.8, 23.7)))
-        panel(box(at=(-12, 3.9, -11.85), size=(24, 0.3, 23.7)))
-        """)
-    )
-    tied = tie(program, evidence_of_program(program), price=price)
-    points = unroll(program).sample(4_000, torch.Generator().manual_seed(0))
-    assert unroll(tied).distance(points).abs().max() < TIES.moved + 0.1
+STAIRS = "".join(f"box(at=(0, {2 * k - 9}, -6), size=({4 + 0.28 * k:.2f}, 2, 12))\n" for k in range(9))
+
+
+@pytest.mark.parametrize(("moved", "far"), [(0.8, (0.3, 0.81)), (np.inf, (1.2, 2.3))])
+def test_chains_of_relations_move_no_face_far_whatever_a_number_is_worth(moved, far, monkeypatch: pytest.MonkeyPatch):
+    # Each top may be flush with the next, .28 cells away; the first and the last are 2.24 apart.
+    monkeypatch.setattr(layouts, "TIES", replace(TIES, moved=moved))
+    program = sp.parse(STAIRS)
+    tied = unroll(tie(program, evidence_of_program(program), price=1e5))
+    assert far[0] < (tied.centre + tied.reach - unroll(program).centre - unroll(program).reach).abs().max() < far[1]
+
+
+def test_limits_of_relations_are_those_of_the_surface():
+    text = "for i in translate(11, by=(2, 0, 0)):\n    box(at=(-12, -4, -8), size=(1, 8, 16))\n"
+    row = Layout(placed(sp.parse(text)).source)
+    (step,) = np.flatnonzero([kind == "shift" for kind in row.tunable.kinds])
+    assert np.diff([limit[step] for limit in row.limits]) == pytest.approx(2 * TIES.moved / 10)
+
+
+def test_a_program_is_placed_where_relations_leave_a_part_without_length(monkeypatch: pytest.MonkeyPatch):
+    def fails(ties: tying._Ties, price: float) -> Program:
+        raise Fault(Comment(""), "start and end are the same point", "move one of them")
+
+    monkeypatch.setattr(tying._Ties, "tied", fails)
+    program = sp.parse(TABLE)
+    tied = tie(program, evidence_of_program(program))
+    assert tied.scale is not None
+    assert [*source_of(tied).numbers] == [*SIZES]
 
 
 def test_copies_that_are_off_their_line_by_hundredths_lie_in_it():
@@ -819,7 +834,7 @@ for _ in divide(3, x, rear=0, depth=j):
     known = WHOLE | {"a": 1, "b": 1.5, "c": 0.8, "d": 0.4, "e": 9, "f": 2, "g": 3, "h": 4, "i": 5, "j": 0.6}
     names = named(lines, {name: known[name] for name in "abcdefghij"}, known)
     assert names == {
-        "a": "leg_inset",  # left-right and front-rear
+        "a": "leg_margin",  # left-right and front-rear
         "b": "leg_width",  # of a square section
         "c": "thickness",  # of several roles; the clearance of the leg is that of the seat
         "d": "inset",
@@ -827,7 +842,7 @@ for _ in divide(3, x, rear=0, depth=j):
         "f": "stretcher_inset",
         "g": "stretcher_setback",
         "h": "stretcher_bottom",
-        "i": "post_inset",
+        "i": "post_margin",
         "j": "door_thickness",  # the size of the box that they divide
     }
 

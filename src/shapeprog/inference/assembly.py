@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
-from shapeprog.inference.candidates.drawings import between_ends, canonical_side, simplest, solid_boxes
+from shapeprog.inference.candidates.drawings import canonical_side, simplest, solid_boxes
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
 from shapeprog.inference.candidates.neighbours import neighbours, recounted, residual_candidates, shorter
 from shapeprog.inference.candidates.singles import single_candidates
@@ -60,7 +60,7 @@ def assemble(
     fitted = on_planes(_unharmed(adjusted, start, coverage), evidence)
     program = connected(snapped(fitted, evidence), coverage)
     program = canonical_side(simplest(program))
-    program = between_ends(in_order(with_roles(separated(program, blocks))))
+    program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)
     table = coverage.table([*program.body, *others[:1]])
     share, more = (explained(table, range(number)) for number in (count, len(table.prices)))

@@ -18,13 +18,13 @@ class Deadline:
     """A moment after which no further step starts."""
 
     at: float = float("inf")  # value of ``time.monotonic()``; never by default
-    cut: str = ""  # the step that it cut short, and the progress of that step; empty if none was
+    cut: str = ""  # the first step that it cut short, and the progress of that step; empty if none was
 
     def passed(self, work: str) -> bool:
         """Whether it is too late for the next step; ``work`` names that step and its progress."""
         if time.monotonic() <= self.at:
             return False
-        self.cut = work
+        self.cut = self.cut or work
         return True
 
 

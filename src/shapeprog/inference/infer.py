@@ -27,6 +27,7 @@ from shapeprog.geometry.cells import iou, pack
 from shapeprog.inference.assembly import assemble
 from shapeprog.inference.budget import BUDGET, Deadline, Progress
 from shapeprog.inference.calls import with_calls
+from shapeprog.inference.candidates.drawings import between_ends
 from shapeprog.inference.cells.reconstruct import description_length, reconstruct
 from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Coverage, Prices
@@ -73,7 +74,7 @@ class Result:
     cut
         Steps that the time budget cut short, and their progress; if none, the same seed gives an equal result.
     seconds
-        How long it took; comparisons of results ignore it.
+        How long it took after loading; comparisons of results ignore it.
     """
 
     program: Program
@@ -122,7 +123,7 @@ def infer(
     blocks
         Most blocks of the program.
     budget
-        Seconds after which no further step of search or fitting starts.  Choice and ties are not interrupted.
+        Seconds after which neither the second choice nor a further step of the search on cells or of fitting starts.
     seed
         Of the searches.  Samples of meshes and point clouds are the same for all seeds.
     settings
@@ -133,7 +134,8 @@ def infer(
     detail
         Factor by which the prices of blocks and numbers are divided: above 1 the program is finer.
     ties
-        Whether numbers that hold together are tied: the few that are free have names, all others are expressions.
+        Whether numbers that hold together are tied: those used several times have names, and what follows from others
+        is an expression.
     libraries
         Functions that the program is written with wherever that is shorter, unless it has the paper's statements alone.
         Parts that are nearly a call of a function move to where the call draws them.
@@ -173,6 +175,8 @@ def infer(
             coverage, blocks=blocks, seed=seed, deadline=refining, progress=progress
         )
     if not program.body:  # voxels, the statements of the paper, or a surface that gave no program
+        prepare_kernels(cells=True)
+        scores.clear()
         limits = settings or Settings()
         program, snapped, reason = reconstruct(
             target, evidence, settings=replace(limits, blocks=blocks, price=limits.price / detail),
@@ -184,9 +188,9 @@ def infer(
         if libraries:
             final, held = with_calls(final, joined(libraries), coverage)
         if ties:
-            final = tie(final, evidence, floor=floor, held=held)
             if progress:
-                progress("tying numbers", 1.0)
+                progress("tying numbers", 0.0)
+            final = tie(final if held else between_ends(final), evidence, floor=floor, held=held)
         cells = target.voxels
         if snapped is None or description_length(final, cells) <= description_length(program, cells, snapped):
             program, snapped = final, None

@@ -1,4 +1,4 @@
-"""Drawings of oriented boxes by statements, and equivalent blocks with fewer numbers or on another side."""
+"""Drawings of oriented boxes by statements, and blocks that draw nearly the same with fewer or other numbers."""
 
 from __future__ import annotations
 
@@ -112,7 +112,8 @@ def canonical_side(program: Program) -> Program:
 
 
 def between_ends(program: Program) -> Program:
-    """The program with nearly upright parts as boxes, and boards that lean as bars between the middles of their ends.
+    """The program, of one node for each block, with boxes for boards and bars that are nearly upright, and bars between
+    the middles of their ends for boards that lean.
 
     A board is given by its lower edge and its angle; its upper edge is not linear in these numbers, so nothing could be
     tied to it.  A panel that leans sideways is a bar upwards, without a turn about itself.

@@ -104,7 +104,7 @@ class Layout:
         shortest = [float(rod @ self.numbers) / 2 for rod in rods]
         self.low: FloatArray = np.append(self.tunable.low.numpy() - self._offset, shortest)
         # Between these (2, G) relations may change them: the misfit is quadratic in small moves alone.
-        far = [np.inf if kind == "angle" else TIES.moved for kind in self.tunable.kinds] + [np.inf] * len(rods)
+        far = np.append(TIES.moved / self.tunable.scale.numpy(), np.full(len(rods), np.inf))
         start = self.bounded @ self.numbers
         self.limits: tuple[FloatArray, FloatArray] = np.maximum(self.low, start - far), start + far
 
@@ -137,7 +137,7 @@ class Layout:
         return index, "start" if "start" in dict(self.lines[index].keywords) else ""
 
     def fixed(self) -> FloatArray:
-        """Relations (M, P) that always hold: the width and the depth of a round part that fills the whole are equal."""
+        """Relations (M, P) that always hold: equal width, depth and clearances of a round part that fills the whole."""
         pairs = [(0, 1)] if self._filling else []
         for line in self._filling:
             sides = [k for k, slot in enumerate(self.slots) if slot.line == line and slot.kind == "clearance"]
@@ -167,7 +167,7 @@ class Layout:
         width, depth = self._numbers["width"], self._numbers["depth"]
         (left, right), (front, rear) = (ends_of(line, "", axis, self._numbers) for axis in range(2))
         size = min(right - left, rear - front)
-        off = max(abs(left + right - width) / 2, abs(front + rear - width) / 2, abs(width - depth))
+        off = max(abs(left + right - width) / 2, abs(front + rear - depth) / 2, abs(width - depth))
         sizes: dict[str, Argument] = {"radius": dict(line.keywords).get("radius", size / 2)}
         left_out = {*SIZES[:2], "radius"}
         if line.kind == "cylinder" and size > TIES.fills * width and off < TIES.off_middle * width:

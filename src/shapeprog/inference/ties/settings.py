@@ -28,18 +28,18 @@ class TieSettings:
     component_share: float = 0.25
 
     # Rounds
-    rounds: int = 3  # most searches for relations: first contacts and parts on the floor, then all
-    moved: float = 0.8  # largest change in cells by which relations may move a number of a drawing statement
+    rounds: int = 3  # most searches for relations: first parts on the floor and those priced like contacts, then all
+    moved: float = 0.8  # cells by which relations may move the surface by any number of a statement
     repeats: int = 6  # most times that parts are tied which come apart,
     heavier: float = 10.0  # each time with so many times the weight of their joints
 
     # Price of the number that a relation saves, as a multiple of the usual price.  All others have the usual price:
     # zeros, equal sections, equal sizes of parts of one role, and equal clearances (of a part at a corner, of parts at
-    # one side or at opposite sides, of a row along one axis); faces of one side that touch have half of it.
+    # one side or at opposite sides); faces of one side that touch have half of it.
     floor: float = 6.0  # a part that ends just above the floor
     # Equal clearances on the left and right, in front and at the rear, above and below
     symmetric: tuple[float, float, float] = (4.0, 2.0, 2.0)
-    contact: float = 2.0  # faces that meet
+    contact: float = 2.0  # faces that meet, and equal clearances of a row
     straight: float = 1.5  # ends of a rod at equal distances, or on the middle line of a part that it touches
 
     # By how much a relation may be off

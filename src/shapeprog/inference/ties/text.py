@@ -31,7 +31,7 @@ PLACES = {
 """The quantities that keywords measure whose names do not say so."""
 
 FURTHER = {
-    "inset": ("outer", "inner"), "setback": ("outer", "inner"), "clearance": ("outer", "inner"),
+    **dict.fromkeys(("inset", "setback", "margin", "clearance"), ("outer", "inner")),
     "drop": ("upper", "lower"), "bottom": ("lower", "upper"), "offset": ("inner", "outer"),
 }  # fmt: skip
 """The quantities that measure where a part is, with words for the less and the larger of two of them."""
@@ -163,7 +163,7 @@ def _candidates(uses: Sequence[Use]) -> tuple[list[str], list[str]]:
     kinds = Counter(use.quantity for use in selected)
     (kind, _), *others = kinds.most_common()
     if others and kind in FURTHER:
-        kind = "inset" if kinds.keys() <= {"inset", "setback"} else "clearance"
+        kind = "margin" if kinds.keys() <= {"inset", "setback"} else "clearance"
     ((_, role), count), *_ = Counter((use.line, use.role) for use in selected).most_common()
     shared = []
     if kind in SIZES and count > 1:  # the section of a square part

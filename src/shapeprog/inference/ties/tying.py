@@ -27,7 +27,7 @@ from shapeprog.inference.ties.misfit import Misfit
 from shapeprog.inference.ties.relations import Relation, relations, worthwhile
 from shapeprog.inference.ties.settings import TIES
 from shapeprog.inference.ties.text import written
-from shapeprog.language.ast import Source
+from shapeprog.language.ast import Fault, Source
 from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import merged
@@ -47,6 +47,8 @@ def tie(
     seed: int = 0,
 ) -> Program:
     """The same program placed from the sides, with names for shared numbers; the same for the same seed.
+
+    It is unchanged if a statement has no placed form, and has no names if relations would leave a part without length.
 
     Parameters
     ----------
@@ -71,18 +73,21 @@ def tie(
     corners = None if known or evidence.mesh is None else evidence.mesh.vertices
     box = None if corners is None else (corners.min(0), corners.max(0))
     given = Program(program.body) if held else merged(Program(program.body))
+    try:
+        start = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box)
+    except ShapeProgError:  # a statement without a placed form
+        return program
+    assert start.source is not None
     with one_thread(kernels=1):
+        ties = _Ties(start.source, evidence, seed, known=known, held=held)
         try:
-            source = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box).source
-            assert source is not None
-            ties = _Ties(source, evidence, seed, known=known, held=held)
             return ties.tied(price * ties.price)
-        except ShapeProgError:  # a statement without a placed form, or relations left a part without length
-            return program
+        except Fault:  # relations left a part without length
+            return start
 
 
 class _Ties:
-    """Everything about a program that does not depend on the price of a number."""
+    """The joints, relations and misfit of one program."""
 
     def __init__(self, source: Source, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
         flat = Layout(source, divide=not held)  # lines are held by their numbers, which divisions change
@@ -122,9 +127,9 @@ class _Ties:
     def tied(self, price: float) -> Program:
         """The program tied at a price of a number, in the unit of the misfit.
 
-        Where ties separate lines from the others, the joints of these weigh more, and its numbers are tied again.
+        Where ties separate lines from the others, the joints of these weigh more, and its numbers are tied again, up to
+        ``TIES.repeats`` times.  Distances near zero are dropped.
         """
-        self.misfit.together[:] = TIES.together
         for _ in range(TIES.repeats):
             solution, values = self._solved(price)
             kinds = [self.layout.slots[k].kind for k in solution.free]

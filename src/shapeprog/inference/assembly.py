@@ -1,9 +1,9 @@
 """Structure from the surface: a program of few blocks that explains the visible surface of a target.
 
 Pieces of the target become single blocks, and copies among them loops.  A first choice is fitted briefly, then competes
-with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored where fitting
-did harm, moved onto the planes of a mesh, drawn on its components, and connected again.  Then all parts get roles.
-Pieces become candidates by the hints of statements, not by their names.
+with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored or shortened
+where that costs nothing, moved onto the planes of a mesh, drawn on its components, and connected again.  Then pairs of
+different roles are separated, and all parts get roles and an order.
 """
 
 from __future__ import annotations

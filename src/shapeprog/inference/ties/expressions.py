@@ -26,7 +26,7 @@ from shapeprog.space import Array, FloatArray
 ELIMINATED = {
     "clearance": 0, "offset": 0, "edge": 1, "gap": 1, "radius": 2, "size": 3, "length": 3, "angle": 3, "extent": 9
 }  # fmt: skip
-"""Which kinds of numbers rather follow from others: small ones first."""
+"""Which kinds of numbers rather follow from others: those of the lowest rank first."""
 
 DISTANCES = "clearance", "offset"  # kinds of numbers that are dropped near zero, and that may be measured from another
 NOTHING = 1e-7  # factors up to this are zero

@@ -1,8 +1,8 @@
 """Relations between the numbers of a placed program: zero, equal, in contact, straight, symmetric.
 
-Only quantities of one kind are related: a clearance with a clearance of the same anchor, a size with a size, a radius
-with a radius.  Most relations are written with one name used twice; faces that meet may need a sum.  Those whose price
-in fit is below that of the number they save are selected.
+Only quantities of one kind are related: a clearance with a clearance (of the same anchor, at a corner, or of opposite
+sides), a size with a size, a radius with a radius.  Most relations are written with one name used twice; faces that
+meet may need a sum.  Those whose price in fit is below that of the number they save are selected.
 """
 
 from __future__ import annotations
@@ -69,10 +69,10 @@ def worthwhile(
 ) -> tuple[FloatArray, FloatArray]:
     """The rows (M, V) of the selected relations, and the optimum (V,) where they hold.
 
-    Near its optimum the misfit of a program is quadratic.  With H its curvature and p the numbers, imposing c p = 0
-    costs (c p)^2 / (c H^-1 c'), so thousands of relations are priced without a refit; the cheapest is imposed, H^-1 and
-    p follow by one elimination, and so on.  Parts that meet along two axes would touch along an edge alone, so a
-    relation by which they would is not imposed.
+    Near its optimum the misfit of a program is quadratic.  With H half its curvature and p the numbers, c p = 0
+    costs (c p)^2 / (c H^-1 c'), so thousands of relations are priced without a refit; the one that saves most is
+    imposed, H^-1 and p follow by one elimination, and so on.  Parts that meet along two axes would touch along an edge
+    alone, so a relation by which they would is not imposed.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ def worthwhile(
     price
         Price of a number, in the unit of the misfit.
     bounded, limits
-        Rows (G, V), and the lower and upper bounds (G,) of their products with the numbers; no relation may violate
-        these.
+        Rows (G, V), and the lower and upper bounds (G,) of their products with the numbers; no relation of finite trust
+        may violate these.
     """
     rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
     imposed, free, axes, edges = list[FloatArray](), np.linalg.inv(curvature), rows[:0], 0

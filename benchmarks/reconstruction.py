@@ -42,11 +42,11 @@ COLUMNS = (
 def measure(task: Task) -> list[dict[str, Any]]:
     """Rows of one shape for all methods that were asked for."""
     from shapeprog.data import read_pack
+    from shapeprog.data.cells import points_of_cells
     from shapeprog.evaluation.metrics import evaluate_program
     from shapeprog.inference import greedy_boxes, infer
     from shapeprog.inference.cells.reconstruct import refined
     from shapeprog.inference.infer import prepare_kernels
-    from shapeprog.inference.surface.evidence import points_of_cells
 
     torch.set_num_threads(1)
     prepare_kernels(cells=True)

@@ -17,9 +17,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from shapeprog.data.cells import points_of_cells
 from shapeprog.data.packs import write_pack
 from shapeprog.data.shape import Shape
-from shapeprog.inference.surface.evidence import points_of_cells
 from shapeprog.liang2022.fast import Fast, FastSettings
 from shapeprog.liang2022.generator import Generator
 from shapeprog.liang2022.loop import Record, train

@@ -10,6 +10,7 @@ from textwrap import dedent
 import numpy as np
 import pytest
 import torch
+from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 
 import shapeprog as sp
@@ -18,8 +19,8 @@ from shapeprog.cli.app import app
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.candidates.drawings import between_ends
 from shapeprog.inference.fit.joints import find_joints
+from shapeprog.inference.fit.residuals import closeness
 from shapeprog.inference.surface.evidence import evidence_of_program
-from shapeprog.inference.ties import layout as layouts
 from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.elements import Slot
@@ -197,27 +198,26 @@ def test_what_draws_nothing_is_left_alone():
 def test_a_relation_is_worth_having_where_its_price_is_below_that_of_a_number():
     # The misfit (x - 1)^2 + (y - 1.2)^2 rises by .02 where x = y, which is then 1.1.
     equal = Relation(np.array([1.0, -1.0]), 1.0)
-    start, unlimited = np.array([1.0, 1.2]), (np.full(2, -np.inf), np.full(2, np.inf))
-    rows, at = worthwhile([equal], start, np.eye(2), 0.021, np.eye(2), unlimited)
+    start, low = np.array([1.0, 1.2]), np.full(2, -np.inf)
+    rows, at = worthwhile([equal], start, np.eye(2), 0.021, low=low, bounded=np.eye(2))
     np.testing.assert_allclose(at, [1.1, 1.1])
     assert len(rows) == 1
-    rows, at = worthwhile([equal], start, np.eye(2), 0.019, np.eye(2), unlimited)
+    rows, at = worthwhile([equal], start, np.eye(2), 0.019, low=low, bounded=np.eye(2))
     np.testing.assert_allclose(at, start)
     assert not len(rows)
 
 
-def test_no_relation_moves_a_number_beyond_its_limits():
+def test_no_relation_moves_a_number_below_its_least():
     same = Relation(np.array([1.0, -1.0]), 1.0)
-    start, unlimited = np.array([1.0, 1.2]), np.full(2, np.inf)
-    for limits in ((np.array([0.9, 1.15]), unlimited), (-unlimited, np.array([1.05, 1.25]))):
-        rows, _ = worthwhile([same], start, np.eye(2), 1.0, np.eye(2), limits)
-        assert not len(rows)
+    low = np.array([0.9, 1.15])
+    rows, _ = worthwhile([same], np.array([1.0, 1.2]), np.eye(2), 1.0, low=low, bounded=np.eye(2))
+    assert not len(rows)
 
 
 def test_no_relation_takes_the_thickness_of_a_part_between_two_faces():
     together = Relation(np.array([1.0, -1.0]), 1.0)
     faces, between = np.array([1.0, 1.15]), np.array([[-1.0, 1.0]])
-    rows, at = worthwhile([together], faces, np.eye(2), 1.0, between, (np.array([0.1]), np.array([np.inf])))
+    rows, at = worthwhile([together], faces, np.eye(2), 1.0, low=np.array([0.1]), bounded=between)
     assert not len(rows)
     np.testing.assert_allclose(at, faces)
 
@@ -226,10 +226,10 @@ def test_parts_that_meet_along_one_axis_do_not_along_another():
     meetings = [frozenset({(0, 1, axis)}) for axis in (0, 2)]
     first, second = (Relation(np.eye(2)[k], 1.0, meeting) for k, meeting in enumerate(meetings))
     other = Relation(np.eye(2)[1], 1.0, frozenset({(1, 2, 2)}))
-    start, unlimited = np.array([0.01, 0.02]), (np.full(2, -np.inf), np.full(2, np.inf))
-    rows, _ = worthwhile([first, second], start, np.eye(2), 1.0, np.eye(2), unlimited)
+    start, low = np.array([0.01, 0.02]), np.full(2, -np.inf)
+    rows, _ = worthwhile([first, second], start, np.eye(2), 1.0, low=low, bounded=np.eye(2))
     assert rows.tolist() == [[1, 0]]  # else they would touch along an edge
-    rows, _ = worthwhile([first, other], start, np.eye(2), 1.0, np.eye(2), unlimited)
+    rows, _ = worthwhile([first, other], start, np.eye(2), 1.0, low=low, bounded=np.eye(2))
     assert len(rows) == 2
 
 
@@ -452,9 +452,8 @@ def test_no_relation_is_kept_that_follows_from_others(seed: int):
     rows = random.integers(-1, 2, (6, count)).astype(float)
     rows = np.stack([*rows, *(one + sign * two for one, two in combinations(rows, 2) for sign in (1, -1))])
     offered = [Relation(row, 1.0) for row in rows]
-    numbers, unlimited = random.normal(0, 0.01, count), np.full(count, np.inf)
-    curvature = (curvature + curvature.T) / 2
-    kept, _ = worthwhile(offered, numbers, curvature, 1.0, np.eye(count), (-unlimited, unlimited))
+    numbers, low = random.normal(0, 0.01, count), np.full(count, -np.inf)
+    kept, _ = worthwhile(offered, numbers, (curvature + curvature.T) / 2, 1.0, low=low, bounded=np.eye(count))
     assert 0 < len(kept) == np.linalg.matrix_rank(kept)
 
 
@@ -501,34 +500,37 @@ def test_an_overhang_that_is_the_same_on_all_sides_is_one_number():
     assert free[0.54] == free[1.54] - 1
 
 
-STAIRS = "".join(f"box(at=(0, {2 * k - 9}, -6), size=({4 + 0.28 * k:.2f}, 2, 12))\n" for k in range(9))
+def test_surfaces_are_close_to_themselves_and_the_less_the_more_of_them_is_elsewhere():
+    program = sp.parse("box(at=(-6, -6, -6), size=(12, 12, 12))")
+    evidence = evidence_of_program(program)
+    boxes = (sp.parse(f"box(at=(-6, -6, -6), size=({height}, 12, 12))") for height in (12, 10, 6, 0.4))
+    surface = cKDTree(evidence.surface)
+    found = [closeness(unroll(box), surface, 0) for box in boxes]
+    assert found[0] == pytest.approx(1, abs=1e-3)
+    assert found == sorted(found, reverse=True)
+    side, base = (
+        12 * 10,
+        144,
+    )  # of a box that is 2 lower the top is nowhere, and a sixth of the target's sides and its top
+    precision, recall = (4 * side + base) / (4 * side + 2 * base), (4 * side + base) / (6 * base)
+    assert found[1] == pytest.approx(2 * precision * recall / (precision + recall), abs=0.03)
+    assert closeness(unroll(sp.parse("box(at=(8, 8, 8), size=(1, 1, 1))")), surface, 0) == 0
 
 
-@pytest.mark.parametrize(("moved", "far"), [(0.8, (0.3, 0.81)), (np.inf, (1.2, 2.3))])
-def test_chains_of_relations_move_no_face_far_whatever_a_number_is_worth(moved, far, monkeypatch: pytest.MonkeyPatch):
-    # Each top may be flush with the next, .28 cells away; the first and the last are 2.24 apart.
-    monkeypatch.setattr(layouts, "TIES", replace(TIES, moved=moved))
-    program = sp.parse(STAIRS)
-    tied = unroll(tie(program, evidence_of_program(program), price=1e5))
-    assert far[0] < (tied.centre + tied.reach - unroll(program).centre - unroll(program).reach).abs().max() < far[1]
-
-
-def test_limits_of_relations_are_those_of_the_surface():
-    text = "for i in translate(11, by=(2, 0, 0)):\n    box(at=(-12, -4, -8), size=(1, 8, 16))\n"
-    row = Layout(placed(sp.parse(text)).source)
-    (step,) = np.flatnonzero([kind == "shift" for kind in row.tunable.kinds])
-    assert np.diff([limit[step] for limit in row.limits]) == pytest.approx(2 * TIES.moved / 10)
-
-
-def test_a_program_is_placed_where_relations_leave_a_part_without_length(monkeypatch: pytest.MonkeyPatch):
-    def fails(ties: tying._Ties, price: float) -> Program:
-        raise Fault(Comment(""), "start and end are the same point", "move one of them")
-
-    monkeypatch.setattr(tying._Ties, "tied", fails)
-    program = sp.parse(TABLE)
-    tied = tie(program, evidence_of_program(program))
-    assert tied.scale is not None
-    assert [*source_of(tied).numbers] == [*SIZES]
+@pytest.mark.parametrize("price", [1.0, 1000.0])
+def test_ties_cost_little_of_the_surface_whatever_a_number_is_worth(price: float):
+    program = sp.parse(
+        dedent("""
+        for i in mirror(side):
+            side(box(at=(-12, -4, 11.85), size=(24, 8, 0.15)))
+        for i in translate(5, by=(5.6, 0, 0)):
+            shelf(box(at=(-11.7, -3.9, -11.85), size=(0.5, 7.8, 23.7)))
+        panel(box(at=(-12, 3.9, -11.85), size=(24, 0.3, 23.7)))
+        """)
+    )
+    evidence = evidence_of_program(program)
+    surface, tied = cKDTree(evidence.surface), tie(program, evidence, price=price)
+    assert closeness(unroll(program), surface, 0) - closeness(unroll(tied), surface, 0) <= 0.03
 
 
 def test_copies_that_are_off_their_line_by_hundredths_lie_in_it():
@@ -892,6 +894,36 @@ def test_no_name_is_used_once():
         source = source_of(sp.parse(tied_text(text)))
         uses = [name for line in source.walk() for value in values(line) for name in names_in(value)]
         assert all(uses.count(name) > 1 for name in source.numbers if name not in SIZES)
+
+
+def test_a_program_that_cannot_be_drawn_is_tied_for_less(monkeypatch):
+    program, prices = sp.parse(TABLE), list[float]()
+    tied_at = tying._Ties.tied
+
+    def tied(ties: tying._Ties, price: float) -> Program:
+        prices.append(price)
+        if len(prices) == 1:
+            raise Fault(Comment(""), "start and end are the same point", "move one of them")
+        return tied_at(ties, price)
+
+    monkeypatch.setattr(tying._Ties, "tied", tied)
+    assert free_numbers(tie(program, evidence_of_program(program))) < 20
+    assert prices[1] == prices[0] / TIES.cheaper
+
+
+def test_of_attempts_that_all_lose_too_much_the_closest_is_kept(monkeypatch):
+    program, offered = sp.parse(TABLE), list[Program]()
+    losses = iter([0.4, 0.1, 0.2])
+    tied_at = tying._Ties.tied
+
+    def tied(ties: tying._Ties, price: float) -> Program:
+        offered.append(tied_at(ties, price))
+        return offered[-1]
+
+    monkeypatch.setattr(tying._Ties, "tied", tied)
+    monkeypatch.setattr(tying, "closeness", lambda *_: 1 - next(losses) if offered else 1.0)
+    assert tie(program, evidence_of_program(program)) is offered[1]
+    assert len(offered) == TIES.attempts
 
 
 def test_a_refit_goes_on_where_a_part_would_become_too_thin():

@@ -171,6 +171,16 @@ def _remark(text: str) -> str:
     return text
 
 
+def assigned(pairs: Iterable[tuple[str, Value]]) -> list[Assignment]:
+    """Names and their values on as many lines as it takes."""
+    lines: list[list[tuple[str, Value]]] = [[]]
+    for pair in pairs:
+        if sum(len(f"{name}{value}") + 4 for name, value in [*lines[-1], pair]) > 118:
+            lines.append([])
+        lines[-1].append(pair)
+    return [Assignment(tuple(line)) for line in lines if line]
+
+
 def variable(depth: int) -> str:
     """The name of the variable of a loop inside ``depth`` others: i, j, k and so on."""
     letters = [*map(chr, range(ord("i"), ord("z") + 1))]

@@ -30,10 +30,10 @@ from jaxtyping import Float, UInt8
 from torch import Tensor, nn
 
 from shapeprog.arguments import check_number
+from shapeprog.data.cells import points_of_cells
 from shapeprog.data.packs import read_pack
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.surface import face_areas
-from shapeprog.inference.surface.evidence import points_of_cells
 from shapeprog.language import Code, Draw, Program, encode, unroll
 from shapeprog.language.statement import EMPTY
 from shapeprog.liang2022.decode import Decoded, decode

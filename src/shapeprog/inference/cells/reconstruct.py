@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from shapeprog.data.cells import points_of_cells
 from shapeprog.data.shape import Shape
 from shapeprog.formats.samples import occupied
 from shapeprog.geometry.arrays import one_thread
@@ -22,7 +23,7 @@ from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Prices
 from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.tunable import Tunable
-from shapeprog.inference.surface.evidence import Evidence, points_of_cells
+from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import BoolArray

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from shapeprog.geometry.distance import nearest_primitive, slopes_to_slots
+from shapeprog.geometry.distance import nearest_primitive, signed_distance, slopes_to_slots
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.inference.choice.bits import nearby
@@ -143,6 +143,20 @@ def of_target(poses: Poses, pairs: Pairs, width: float) -> System:
     systems = [(off @ weighted, weighted.T @ plain) for weighted, plain, off in zip(*columns, strict=True)]
     by_slot, curvature = map(torch.stack, zip(*systems, strict=True))
     return (by_number * by_slot[..., None]).sum((0, 1)), (by_number.mT @ curvature @ by_number).sum(0)
+
+
+def closeness(scene: Scene, surface: cKDTree, seed: int) -> float:
+    """The F-score of the surfaces of a scene and of a target: how much of each lies near the other.
+
+    The squared misfit assumes that points are assigned to the right parts.  For thin parts and sheets they may not be;
+    the misfit can then fall while a part leaves its surface.  The points of both are the same for the same seed.
+    """
+    reach = FIT.near * float(np.linalg.norm(surface.maxes - surface.mins))
+    points = torch.from_numpy(surface.data[np.random.default_rng(seed).integers(0, surface.n, FIT.compared)])
+    recall = float((signed_distance(scene, points).abs() <= reach).double().mean())
+    sample = sample_surface(scene, FIT.compared, torch.Generator().manual_seed(seed))
+    precision = float(np.isfinite(surface.query(sample.points.numpy(), distance_upper_bound=reach)[0]).mean())
+    return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
 def _dot(first: Vectors, second: Vectors) -> Vectors:

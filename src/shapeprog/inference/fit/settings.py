@@ -22,6 +22,8 @@ class FitSettings:
     component: float = 0.5  # distance within which the faces of a part are those of a component,
     shared: float = 0.85  # or which share of the box around both they have in common, at least
     same: float = 0.5  # least cosine between normals on one face
+    compared: int = 4_000  # points of the target, and of the program, whose closeness is compared
+    near: float = 0.01  # share of the diagonal of the target within which surfaces are close, as in the evaluation
 
     # Straight faces on planes of a mesh
     plane_reach: float = 0.3  # distance within which planes are looked for: farther ones never count enough

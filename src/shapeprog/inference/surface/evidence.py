@@ -8,9 +8,9 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from shapeprog.data.cells import exposed_faces
 from shapeprog.data.sampling import sample_with_faces
 from shapeprog.data.shape import Shape
 from shapeprog.geometry.arrays import over_threads
@@ -24,7 +24,7 @@ from shapeprog.inference.surface.oriented import Boxes, boxes_around, join, prim
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import HALF, RESOLUTION, SPAN, UP, BoolArray, FloatArray, IntArray, cells_at
+from shapeprog.space import HALF, RESOLUTION, UP, BoolArray, FloatArray, IntArray, cells_at
 
 _SPREAD = spiral(1 - (2 * np.arange(32) + 1) / 32)
 DIRECTIONS = _SPREAD / np.abs(_SPREAD).max(1, keepdims=True)
@@ -154,7 +154,7 @@ def _of_cells(voxels: BoolArray) -> Evidence:
 
     Parts that are one cell thick have .7 of that thickness: their two sides do not cross.
     """
-    normals, cells, exact = _exposed_faces(voxels)
+    normals, cells, exact = exposed_faces(voxels)
     single = ~np.pad(voxels, 1)[tuple((cells + 1 - normals.astype(np.int64)).T)]  # one cell thick
     inset = np.where(exact, 0.0, np.where(single, 0.15, SURFACE.inset))
     surface = cells + 0.5 - HALF + (0.5 - inset)[:, None] * normals
@@ -164,32 +164,6 @@ def _of_cells(voxels: BoolArray) -> Evidence:
         SURFACE.cell_tolerance, SURFACE.agreement, surface, normals, np.zeros(count, np.bool_),
         _reach(SURFACE.cell_tolerance, count, count), float(count), ~voxels,
     )  # fmt: skip
-
-
-def points_of_cells(voxels: BoolArray, count: int = 5000) -> npt.NDArray[np.float32]:
-    """Points (count, 3) on the estimated surface of a shape with these touched cells, in the grid frame.
-
-    Uniform on the exposed faces of the cells, moved inwards by ``depth`` but for those at the ends of the longest side,
-    which is 24 cells long by definition.
-    """
-    occupied, random, faces = np.argwhere(voxels), np.random.default_rng(0), _exposed_faces(voxels)
-    selected = random.integers(len(faces[0]), size=count)
-    normals, cells, exact = (column[selected] for column in faces)
-    outwards = 0.5 - np.where(exact, 0.0, SURFACE.depth)
-    points = cells + np.where(normals, 0.5 + outwards[:, None] * normals, random.random((count, 3)))
-    low, high = occupied.min(0), occupied.max(0) + 1
-    margin = np.where(high - low == SPAN, 0.0, SURFACE.depth)
-    return (np.clip(points, low + margin, high - margin) - HALF).astype(np.float32)
-
-
-def _exposed_faces(voxels: BoolArray) -> tuple[FloatArray, IntArray, BoolArray]:
-    """Normals (F, 3) of exposed faces of cells, their cells (F, 3), and which (F,) are at an end of a longest side."""
-    padded, occupied = np.pad(voxels, 1), np.argwhere(voxels)
-    sides = [[voxels & ~np.roll(padded, by, axis)[1:-1, 1:-1, 1:-1] for by in (1, -1)] for axis in range(3)]
-    axis, above, *cell = np.argwhere(sides).T
-    low, high = occupied.min(0)[axis], occupied.max(0)[axis]
-    exact = (high - low == SPAN - 1) & (np.choose(axis, cell) == np.where(above, high, low))
-    return np.where(above, 1, -1)[:, None] * np.eye(3)[axis], np.stack(cell, 1), exact
 
 
 def _reach(tolerance: float, area: float, count: int) -> float:

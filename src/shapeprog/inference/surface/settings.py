@@ -22,7 +22,6 @@ class SurfaceSettings:
     # Depth of the surface of a program below the faces of the cells that it should touch.  The surface is anywhere
     # within the cells that it touches.  Near their middles, errors of fits change no cell.
     inset: float = 0.45
-    depth: float = 0.65  # mean depth of a surface below the faces of the cells that it touches
     planes: int = 16  # points of a scan to which a plane is fitted
     looking: int = 128  # cells along each side of the grid for visibility
     free: int = 64  # cells along each side of the grid of free space

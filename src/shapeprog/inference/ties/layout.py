@@ -103,10 +103,6 @@ class Layout:
         self.bounded: FloatArray = np.vstack([self.jacobian, *rods])
         shortest = [float(rod @ self.numbers) / 2 for rod in rods]
         self.low: FloatArray = np.append(self.tunable.low.numpy() - self._offset, shortest)
-        # Between these (2, G) relations may change them: the misfit is quadratic in small moves alone.
-        far = np.append(TIES.moved / self.tunable.scale.numpy(), np.full(len(rods), np.inf))
-        start = self.bounded @ self.numbers
-        self.limits: tuple[FloatArray, FloatArray] = np.maximum(self.low, start - far), start + far
 
     def _along(self, line: Part | Group) -> FloatArray:
         """How the length of a rod along the axis that it runs along most follows from the numbers (P,)."""

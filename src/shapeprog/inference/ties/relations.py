@@ -65,7 +65,7 @@ def worthwhile(
     curvature: FloatArray,
     price: float,
     bounded: FloatArray,
-    limits: tuple[FloatArray, FloatArray],
+    low: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """The rows (M, V) of the selected relations, and the optimum (V,) where they hold.
 
@@ -82,14 +82,12 @@ def worthwhile(
         The optimum (V,), and half the curvature (V, V) of the misfit there.
     price
         Price of a number, in the unit of the misfit.
-    bounded, limits
-        Rows (G, V), and the lower and upper bounds (G,) of their products with the numbers; no relation of finite trust
-        may violate these.
+    bounded, low
+        Rows (G, V), and lower bounds (G,) of their products with the numbers, which hold.
     """
     rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
     imposed, free, axes, edges = list[FloatArray](), np.linalg.inv(curvature), rows[:0], 0
-    at = bounded @ numbers
-    low, high = np.minimum(limits[0], at) - HOLDS, np.maximum(limits[1], at) + HOLDS
+    low = np.minimum(low, bounded @ numbers) - HOLDS
     meetings = [(k, where) for k, relation in enumerate(candidates) for where in relation.meetings]
     spread, off = np.einsum("kv,vw,kw->k", rows, free, rows, optimize=True), rows @ numbers
     benefit = price * np.array([relation.trust for relation in candidates])
@@ -108,8 +106,7 @@ def worthwhile(
         holds = (spread_then <= minimum) & (np.abs(off_then) < HOLDS)
         met = {where for k, where in meetings if holds[k]}
         edges_then = len(met) - len({where[:2] for where in met})  # axes beyond the first along which pairs meet
-        at = bounded @ moved
-        worse = (at < low).any() or (at > high).any() or edges_then > edges
+        worse = (bounded @ moved < low).any() or edges_then > edges
         new = beside(rows[best], axes)
         if new is not None and (not worse or benefit[best] == np.inf):
             imposed.append(rows[best])

@@ -29,8 +29,10 @@ class TieSettings:
 
     # Rounds
     rounds: int = 3  # most searches for relations: first parts on the floor and those priced like contacts, then all
-    moved: float = 0.8  # cells by which relations may move the surface by any number of a statement
-    repeats: int = 6  # most times that parts are tied which come apart,
+    lost: float = 0.03  # largest decrease of closeness when numbers are tied
+    cheaper: float = 3.0  # divides the price of a number where more is lost
+    attempts: int = 3  # most prices
+    repeats: int = 6  # most times at one price that parts are tied which come apart,
     heavier: float = 10.0  # each time with so many times the weight of their joints
 
     # Price of the number that a relation saves, as a multiple of the usual price.  All others have the usual price:

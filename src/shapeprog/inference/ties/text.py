@@ -18,6 +18,7 @@ from shapeprog.inference.ties.settings import TIES
 from shapeprog.language.ast import Assignment, Group, Line, Part, Point, Source, changed_lines, changed_values, values
 from shapeprog.language.expression import Expression, Linear, Name, Value, names_in, replaced
 from shapeprog.language.placement import RESERVED, SIZES, ends_of
+from shapeprog.language.printer import assigned
 from shapeprog.language.statement import language
 from shapeprog.space import FloatArray
 
@@ -68,7 +69,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray) -> Source:
     final: dict[str, Value] = {provisional: Name(name) for provisional, name in names.items()}
     pairs = [(names[name], _with(value, final)) for name, value in shared.items()]
     for are_sums in (False, True):
-        header += _assignments([pair for pair in pairs if isinstance(pair[1], Expression) == are_sums])
+        header += assigned([pair for pair in pairs if isinstance(pair[1], Expression) == are_sums])
     floor = layout.scale.floor + (layout.extents[2] - float(known["height"])) * layout.scale.cells_per_unit / 2
     return Source((*header, *_changed(body, final)), layout.source.unit, replace(layout.scale, floor=floor))
 
@@ -85,16 +86,6 @@ def _with(value: Value, table: Mapping[str, Value]) -> Value:
 def _changed(lines: tuple[Line, ...], table: Mapping[str, Value]) -> tuple[Line, ...]:
     """Lines with names replaced."""
     return changed_lines(lines, lambda line: changed_values(line, lambda value: _with(value, table)))
-
-
-def _assignments(pairs: list[tuple[str, Value]]) -> list[Assignment]:
-    """Names and their values on as many lines as it takes."""
-    lines: list[list[tuple[str, Value]]] = [[]]
-    for pair in pairs:
-        if sum(len(f"{name}{value}") + 4 for name, value in [*lines[-1], pair]) > 118:
-            lines.append([])
-        lines[-1].append(pair)
-    return [Assignment(tuple(line)) for line in lines if line]
 
 
 class Use(NamedTuple):

@@ -13,11 +13,13 @@ from collections.abc import Collection
 
 import numpy as np
 import torch
+from scipy.spatial import cKDTree
 
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_thread
 from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.inference.fit.joints import find_joints
+from shapeprog.inference.fit.residuals import closeness
 from shapeprog.inference.fit.tunable import CELLS, DEGREES
 from shapeprog.inference.surface.evidence import Evidence, off_parts
 from shapeprog.inference.ties.anchors import anchors_of
@@ -33,6 +35,7 @@ from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import merged
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
 
@@ -48,7 +51,8 @@ def tie(
 ) -> Program:
     """The same program placed from the sides, with names for shared numbers; the same for the same seed.
 
-    It is unchanged if a statement has no placed form, and has no names if relations would leave a part without length.
+    Where more than ``TIES.lost`` of the closeness of the surfaces is lost, numbers are tied at lower prices.  The same
+    program comes back if a statement has no placed form.
 
     Parameters
     ----------
@@ -74,20 +78,29 @@ def tie(
     box = None if corners is None else (corners.min(0), corners.max(0))
     given = Program(program.body) if held else merged(Program(program.body))
     try:
-        start = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box)
+        tied = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box)
     except ShapeProgError:  # a statement without a placed form
         return program
-    assert start.source is not None
+    assert tied.source is not None
     with one_thread(kernels=1):
-        ties = _Ties(start.source, evidence, seed, known=known, held=held)
-        try:
-            return ties.tied(price * ties.price)
-        except Fault:  # relations left a part without length
-            return start
+        ties = _Ties(tied.source, evidence, seed, known=known, held=held)
+        surface = cKDTree(evidence.surface, balanced_tree=False)  # faster to build
+        before, least = 0.0 if known else closeness(unroll(program), surface, seed), math.inf
+        for attempt in range(TIES.attempts):
+            try:
+                offered = ties.tied(price * ties.price / TIES.cheaper**attempt)
+            except Fault:  # relations left a part without length
+                continue
+            lost = 0.0 if known else before - closeness(unroll(offered), surface, seed)
+            if lost < least:
+                tied, least = offered, lost
+            if lost <= TIES.lost:
+                break
+    return tied
 
 
 class _Ties:
-    """The joints, relations and misfit of one program."""
+    """Everything about a program that does not depend on the price of a number."""
 
     def __init__(self, source: Source, evidence: Evidence, seed: int, *, known: bool, held: Collection[int]) -> None:
         flat = Layout(source, divide=not held)  # lines are held by their numbers, which divisions change
@@ -130,6 +143,7 @@ class _Ties:
         Where ties separate lines from the others, the joints of these weigh more, and its numbers are tied again, up to
         ``TIES.repeats`` times.  Distances near zero are dropped.
         """
+        self.misfit.together[:] = TIES.together
         for _ in range(TIES.repeats):
             solution, values = self._solved(price)
             kinds = [self.layout.slots[k].kind for k in solution.free]
@@ -160,7 +174,7 @@ class _Ties:
                 if (step or early) and not relation.row[self.fixed].any():
                     candidates.append(relation)
             _, curvature = self.misfit.at(numbers, TIES.draws)
-            rows, optimum = worthwhile(candidates, numbers, curvature, price, layout.bounded, layout.limits)
+            rows, optimum = worthwhile(candidates, numbers, curvature, price, layout.bounded, layout.low)
             if step and len(rows) == before:
                 break
             numbers = self.misfit.refitted(optimum, rows)

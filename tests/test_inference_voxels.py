@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
 import pytest
 import torch
@@ -10,11 +12,15 @@ import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh
 from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import solid
+from shapeprog.geometry.mesh import union_mesh
+from shapeprog.inference.assembly import Assembly
 from shapeprog.inference.cells.reconstruct import description_length
 from shapeprog.inference.fit.residuals import Target
 from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.language.parser import parse
+from shapeprog.language.program import Program
+from shapeprog.language.unroll import unroll
 
 TABLE = """\
 box(at=(6.3, -7.7, -11.7), size=(1.4, 15.4, 23.4))
@@ -87,3 +93,14 @@ def test_cells_without_any_order_have_pairs():
         tunable.scene(tunable.values), torch.Generator().manual_seed(0)
     )
     assert pairs.weights.isfinite().all()
+
+
+def test_a_mesh_whose_surface_gives_no_program_is_searched_on_cells_and_scored_by_them(monkeypatch: pytest.MonkeyPatch):
+    inferring = importlib.import_module("shapeprog.inference.infer")  # the package has a function of this name
+    monkeypatch.setattr(inferring, "assemble", lambda *_, **__: Assembly(Program(), 0.0, ""))
+    program = sp.parse("box(at=(-8, -4, -6), size=(16, 8, 12))")
+    mesh = shape_from_mesh(*union_mesh(unroll(program)), name="a box", axes=np.eye(3))
+    result = sp.infer(mesh)
+    assert result.program.size
+    assert "explained" not in result.scores
+    assert "explained" not in str(result)

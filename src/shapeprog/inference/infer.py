@@ -219,7 +219,8 @@ def infer(
 def prepare_kernels(*, cells: bool = False) -> None:
     """Compile, or load from the cache, the kernels of inference, with ``cells`` also those of the search on cells.
 
-    No time budget pays for it.  The first call on a machine takes seconds, the first in a process a fraction of one.
+    It does not count against the time budget, except for kernels of cells where a surface gave no program.  The first
+    call on a machine takes seconds, the first in a process a fraction of one.
     """
     prepare(modules_of(*SURFACE_KERNELS, *(CELL_KERNELS if cells else ())))
 

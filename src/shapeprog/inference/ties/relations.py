@@ -83,7 +83,7 @@ def worthwhile(
     price
         Price of a number, in the unit of the misfit.
     bounded, low
-        Rows (G, V), and lower bounds (G,) of their products with the numbers, which hold.
+        Rows (G, V) and lower bounds (G,) of their products with the numbers, which relations of finite trust keep.
     """
     rows: FloatArray = np.array([relation.row for relation in candidates]).reshape(-1, len(numbers))
     imposed, free, axes, edges = list[FloatArray](), np.linalg.inv(curvature), rows[:0], 0

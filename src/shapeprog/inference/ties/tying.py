@@ -76,9 +76,9 @@ def tie(
     whole = program.source if known else None
     corners = None if known or evidence.mesh is None else evidence.mesh.vertices
     box = None if corners is None else (corners.min(0), corners.max(0))
-    given = Program(program.body) if held else merged(Program(program.body))
+    plain = Program(program.body)
     try:
-        tied = placed(given, merge=not held, rows=False, floor=floor, whole=whole, box=box)
+        tied = placed(plain if held else merged(plain), merge=not held, rows=False, floor=floor, whole=whole, box=box)
     except ShapeProgError:  # a statement without a placed form
         return program
     assert tied.source is not None

@@ -10,9 +10,12 @@ import pytest
 
 import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
+from shapeprog.data.remarks import doubt_of_furniture
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.surface.evidence import doubt_of_furniture, evidence_of
+from shapeprog.inference.surface.evidence import evidence_of, note_on_size
+from shapeprog.language.parser import parse
+from shapeprog.language.unroll import unroll
 
 RANDOM = np.random.default_rng(0)
 START = RANDOM.bit_generator.state
@@ -153,7 +156,8 @@ def test_a_strange_shape_gives_a_program_of_finite_numbers_or_a_refusal(name: st
 
 def test_what_does_not_look_like_furniture_is_reported() -> None:
     def doubt(mesh: Mesh) -> str:
-        return doubt_of_furniture(evidence_of(shape_from_mesh(*mesh, name="a shape", axes=np.eye(3))))
+        evidence = evidence_of(shape_from_mesh(*mesh, name="a shape", axes=np.eye(3)))
+        return doubt_of_furniture(evidence.surface, evidence.surface_normals)
 
     turned, across = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, 2 * np.pi, 20), indexing="ij")
     reach = 3 + np.cos(across)
@@ -162,3 +166,18 @@ def test_what_does_not_look_like_furniture_is_reported() -> None:
     faces = np.concatenate([np.stack([corner, corner + 20, corner + step], -1) for step in (1, 21)])
     assert "does not look like furniture" in doubt((torus, faces))
     assert not doubt(moved(CUBE, [5.0, 1, 1]))
+
+
+def test_separate_objects_and_hidden_surface_are_reported() -> None:
+    def reason(*meshes: Mesh) -> str:
+        return sp.infer(shape_from_mesh(*together(*meshes), name="a shape", axes=np.eye(3))).reason
+
+    assert "2 separate pieces, the smallest with 50.0% of its cells" in reason(CUBE, moved(CUBE, 1.0, [0, 5, 0]))
+    assert "is hidden inside)" in reason(*(moved(CUBE, 1 - k / 20) for k in range(20)))
+
+
+def test_a_program_that_is_smaller_than_its_input_is_reported() -> None:
+    evidence = evidence_of(shape_from_mesh(*moved(CUBE, [4.0, 2, 1]), name="a box", axes=np.eye(3)))
+    whole, half = (unroll(parse(f"box(at=(-12, -6, -3), size=({high}, 12, 6))")) for high in (24, 12))
+    assert not note_on_size(whole, evidence)
+    assert "is 50% as high as the input" in note_on_size(half, evidence)

@@ -64,7 +64,8 @@ def assemble(
     count = len(program.body)
     table = coverage.table([*program.body, *others[:1]])
     share, more = (explained(table, range(number)) for number in (count, len(table.prices)))
-    return Assembly(program, share, _reason(count, blocks, share, more - share, others))
+    hidden = float(evidence.weights[evidence.weights < evidence.weights.max()].sum())
+    return Assembly(program, share, _reason(count, blocks, share, hidden, more - share, others))
 
 
 def _candidates(evidence: Evidence) -> list[Node]:
@@ -128,12 +129,14 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     return Program(tuple(nodes[option] for option in selected))
 
 
-def _reason(used: int, allowed: int, share: float, gain: float, others: Sequence[Node]) -> str:
-    """Why the program has so many blocks, which explain this share, and not also the first of the others."""
+def _reason(used: int, allowed: int, share: float, hidden: float, gain: float, others: Sequence[Node]) -> str:
+    """Why the program has so many blocks, which explain this share, and not also the first of the others; ``hidden`` is
+    the share of the surface that cannot be seen from outside."""
     text = f"{used} drawing statement{'s cover' if used != 1 else ' covers'} {share:.0%} of the surface"
+    text += f" ({hidden:.0%} is hidden inside)" * (hidden >= 0.1)
     if used >= allowed:
         return f"{text}; this is the maximum, raise --blocks for more."
     if gain < LEAST_GAIN:
-        return f"{text}; no other candidate would cover more."
+        return f"{text}; no further statement would cover another {LEAST_GAIN:.2%}."
     more = numbers(Program(tuple(others[:1])))
     return f"{text}; one more would cover another {gain:.1%} with {more} more numbers: raise --detail to add it."

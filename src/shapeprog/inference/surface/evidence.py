@@ -24,7 +24,7 @@ from shapeprog.inference.surface.oriented import Boxes, boxes_around, join, prim
 from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import HALF, RESOLUTION, UP, BoolArray, FloatArray, IntArray, cells_at
+from shapeprog.space import HALF, RESOLUTION, BoolArray, FloatArray, IntArray, cells_at
 
 _SPREAD = spiral(1 - (2 * np.arange(32) + 1) / 32)
 DIRECTIONS = _SPREAD / np.abs(_SPREAD).max(1, keepdims=True)
@@ -212,18 +212,14 @@ def looking(barrier: BoolArray, starts: FloatArray, steps: FloatArray, minimum: 
     return result
 
 
-def doubt_of_furniture(evidence: Evidence) -> str:
-    """Why a target does not look like furniture, as a sentence; empty if it does.
-
-    Furniture carries something on level surfaces above the floor, and most of its surfaces face along an axis.
-    """
-    points, normals = evidence.surface, np.abs(evidence.surface_normals)
-    low, extents = points.min(0), np.maximum(np.ptp(points, axis=0), 1e-9)
-    place = (points - low) / extents
-    plan = np.minimum((place[:, 1:] * RESOLUTION).astype(int), RESOLUTION - 1) @ [RESOLUTION, 1]
-    level = (normals[:, UP] > math.cos(math.radians(15))) & (place[:, UP] > 0.1)
-    covered = np.count_nonzero(np.bincount(plan[level])) / np.count_nonzero(np.bincount(plan))
-    along = float((normals.max(1) > math.cos(math.radians(10))).mean())
-    # Less is true of mugs, bottles, cars and figures, and of 2 % of furniture (val), all of it wire or shells.
-    why = f"{along:.0%} of its surface faces along an axis, and level surfaces cover {covered:.0%} of its plan"
-    return "" if covered >= 0.35 or along >= 0.45 else f"This does not look like furniture: {why}."
+def note_on_size(scene: Scene, evidence: Evidence) -> str:
+    """A sentence about the size of a program if it differs from that of the target by more than a tenth; else empty."""
+    there, extents = scene.mask.numpy(), np.ptp(evidence.surface, axis=0)
+    if not there.any():
+        return ""
+    low, high = ((scene.centre + sign * scene.reach).numpy()[there] for sign in (-1, 1))
+    own = high.max(0) - low.min(0)
+    off = np.abs(own - extents) > np.maximum(0.1 * extents, 1.0)  # a sheet has no thickness
+    pairs = zip(np.array(["high", "deep", "wide"])[off], (own / np.maximum(extents, 1e-9))[off], strict=True)
+    sizes = " and ".join(f"{ratio:.0%} as {word}" for word, ratio in pairs)
+    return sizes and f"The program is {sizes} as the input: parts are missing, or differ from it."

@@ -19,6 +19,7 @@ from shapeprog.cli import main, terminal, writing
 from shapeprog.data import load as load_shape
 from shapeprog.data import loading
 from shapeprog.formats import export, load_with_frame
+from shapeprog.space import Frame, grid_axes
 
 
 @pytest.mark.usefixtures("quick")
@@ -407,6 +408,23 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
     assert "two halves of its points" in run("evaluate", "--help").out
     assert "IoU@32" not in shown.out
     assert "IoU@32" in run("evaluate", "programs", "targets", "--all").out
+
+
+@pytest.mark.parametrize("suffix", [".json", ".shape"])
+def test_evaluate_compares_a_program_in_the_axes_that_it_stores_unless_others_are_given(
+    run: Run, tmp_path: Path, suffix: str
+):
+    frame = Frame.around([1, 2, 3], [3, 4, 4.5], grid_axes("-x", "+y"))
+    export(PROGRAM, tmp_path / "input.obj", frame, on_input=True)
+    export(PROGRAM, tmp_path / f"p{suffix}", frame)
+
+    def iou(*words: str) -> float:
+        ended = run("evaluate", f"p{suffix}", "input.obj", "--json", *words)
+        assert ended.code == 0, ended.err
+        return json.loads(ended.out)["rows"][0]["iou"]
+
+    assert iou() == iou("--up=-x", "--front=+y") > 0.99
+    assert iou("--up", "+y") < 0.5
 
 
 def test_evaluate_tells_how_many_physical_parts_have_a_primitive_of_their_own(run: Run, tmp_path: Path, program: Path):

@@ -161,7 +161,8 @@ def evaluate_command(
 
     For --parts DIR, the folder DIR/Chair/bekvam holds the part meshes of the target Chair_bekvam. Parts, predicted
     meshes and predicted point clouds are in the coordinates of the target. A single prediction is compared with a
-    single target whatever their names.
+    single target whatever their names. A program is compared in the axes of the input that its file stores, unless
+    --up or --front is given.
     """
     from rich.progress import track
 
@@ -183,9 +184,10 @@ def evaluate_command(
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
         if isinstance(prediction, tuple):
             terminal.warn(path, *(prediction[0].source.warnings if prediction[0].source else ()))
-            if target is not None:
-                prediction = scoring.aligned(prediction, target)
         try:
+            if isinstance(prediction, tuple) and target is not None:
+                target = target if up or front else scoring.in_pose_of(prediction, target, points, seed)
+                prediction = scoring.aligned(prediction, target)
             rows.append(scoring.measure(prediction, target, points, seed))
             if isinstance(prediction, tuple) and target is not None and target.name in files:
                 rows[-1] = scoring.with_parts(rows[-1], prediction[0], target, files[target.name], seed)

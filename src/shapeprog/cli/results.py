@@ -8,7 +8,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from shapeprog.data.loading import ARRAY_SUFFIXES
+from shapeprog.data.loading import path_of
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.evaluation.metrics import evaluate_program
@@ -38,7 +38,7 @@ def document(result: Result, shape: Shape) -> str:
     """The JSON of a result; without its seconds, so that the same seed writes the same bytes."""
     extra = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
     return program_to_json(
-        result.program, shape.frame, scores=result.scores, reason=result.reason, source=_source(shape), **extra
+        result.program, shape.frame, scores=result.scores, reason=result.reason, source=path_of(shape), **extra
     )
 
 
@@ -83,7 +83,7 @@ def _replaceable(shape: Shape, folder: Path, stem: str, overwrite: bool) -> bool
     if not result.exists():
         return False
     try:
-        if read_result(result).source != _source(shape):
+        if read_result(result).source != path_of(shape):
             return False
     except ShapeProgError:
         return False
@@ -93,13 +93,3 @@ def _replaceable(shape: Shape, folder: Path, stem: str, overwrite: bool) -> bool
         return True
     cure = "it may have been edited: --overwrite replaces it, --out FOLDER writes to another folder"
     raise ShapeProgError(f"{text} is not replaced: it differs from the text in {result.name}", cure)
-
-
-def _source(shape: Shape) -> str | None:
-    """The file, and in a file of many the name of the shape, as :func:`shapeprog.data.load` finds it again."""
-    if shape.source is None:
-        return None
-    path = str(shape.source.absolute())
-    if shape.source.suffix.lower() not in ARRAY_SUFFIXES or shape.name == shape.source.stem:
-        return path
-    return f"{path}#{shape.name.removeprefix(f'{shape.source.stem}#')}"

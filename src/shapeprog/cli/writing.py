@@ -240,14 +240,12 @@ def _as_inferred(path: Path | str, frame: Frame | None) -> Shape:
     """A shape as it was seen when it was inferred, perhaps with --up or --front."""
     import numpy as np
 
-    from shapeprog.data import load
-    from shapeprog.space import HALF, axis_name
+    from shapeprog.data.loading import load_in_axes
+    from shapeprog.space import HALF
 
+    shape = load_in_axes(path, frame)
     if frame is None:
-        return load(path)
-    axes = np.asarray(frame.axes)
-    up, front = axis_name(axes[:, 0]), axis_name(-axes[:, 1])
-    shape = load(path) if up[1] == front[1] else load(path, up=up, front=front)  # a slanted frame turns no cells
+        return shape
     if np.abs(frame.to_grid(shape.frame.centre)).max() > HALF or not 0.4 < shape.frame.scale / frame.scale < 2.5:
         return shape  # it has another unit, or lies in another place
 

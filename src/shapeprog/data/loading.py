@@ -21,7 +21,7 @@ from shapeprog.data.uprightness import find_up
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.formats.shape import read_text
 from shapeprog.language.unit import metres
-from shapeprog.space import Array
+from shapeprog.space import Array, Frame, axis_name
 
 ARRAY_SUFFIXES = frozenset({".xyz", ".npy", ".npz", ".h5", ".hdf5"})
 """Suffixes of files that hold arrays of points or voxels."""
@@ -73,6 +73,28 @@ def load(
 
 
 load_shape = load  # its name in ``shapeprog``, whose ``load`` reads programs
+
+
+def load_in_axes(path: str | os.PathLike[str], frame: Frame | None, *, points: int = 5000, seed: int = 0) -> Shape:
+    """The shape in a file in the axes of a frame, such as that of a program inferred from it with ``up`` or ``front``.
+
+    It is in its own axes without a frame, or if the frame is slanted, which turns no cells.
+    """
+    axes = np.eye(3) if frame is None else np.asarray(frame.axes)
+    up, front = axis_name(axes[:, 0]), axis_name(-axes[:, 1])
+    if frame is None or up[1] == front[1]:
+        return load(path, points=points, seed=seed)
+    return load(path, up=up, front=front, points=points, seed=seed)
+
+
+def path_of(shape: Shape) -> str | None:
+    """The file of a shape, and in a file of many the name of the shape, as :func:`load` finds it again."""
+    if shape.source is None:
+        return None
+    path = str(shape.source.absolute())
+    if shape.source.suffix.lower() not in ARRAY_SUFFIXES or shape.name == shape.source.stem:
+        return path
+    return f"{path}#{shape.name.removeprefix(f'{shape.source.stem}#')}"
 
 
 def load_all(

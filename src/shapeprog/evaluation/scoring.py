@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from shapeprog.data import load_all
+from shapeprog.data.loading import load_in_axes, path_of
 from shapeprog.data.parts import read_parts
 from shapeprog.data.reading import in_words
 from shapeprog.data.sampling import sample_surface
@@ -78,6 +79,14 @@ def read_targets(
         else:
             shapes[shape.name] = shape
     return shapes, failures
+
+
+def in_pose_of(prediction: Prediction, target: Shape, points: int, seed: int) -> Shape:
+    """The target in the axes that a predicted program stores, as it was inferred; as it is for other predictions."""
+    frame, path = None if isinstance(prediction, Shape) else prediction[2], path_of(target)
+    if frame is None or path is None or np.allclose(frame.axes, target.frame.axes, atol=1e-6):
+        return target
+    return load_in_axes(path, frame, points=2 * points, seed=seed)
 
 
 def aligned(prediction: Prediction, target: Shape) -> Prediction:

@@ -14,11 +14,12 @@ import pytest
 import trimesh
 from commands import FRAME, PROGRAM, Run, table
 
-from shapeprog import inference
+from shapeprog import inference, view
 from shapeprog.cli import main, terminal, writing
+from shapeprog.data import Shape, loading
 from shapeprog.data import load as load_shape
-from shapeprog.data import loading
 from shapeprog.formats import export, load_with_frame
+from shapeprog.formats.json_form import program_to_json
 from shapeprog.space import Frame, grid_axes
 
 
@@ -319,6 +320,68 @@ def test_render_makes_pictures_and_export_cells_and_points(run: Run, tmp_path: P
     assert (rows[:, :3] > [0.99, 1.99, 2.9]).all()
     assert (rows[:, :3] < [3.01, 4.01, 4.6]).all()
     assert "unknown picture suffix '.gif'" in run("render", program, "a.gif").err
+
+
+@pytest.fixture
+def shown(monkeypatch: pytest.MonkeyPatch) -> dict[str, Path | None]:
+    """The input that is shown beside each program, by the name of the program."""
+    inputs: dict[str, Path | None] = {}
+
+    def source(shape: Shape | None) -> Path | None:
+        return None if shape is None else shape.source
+
+    monkeypatch.setattr(
+        view, "contact_sheet", lambda items, *_, **__: inputs.update({i.name: source(i.shape) for i in items})
+    )
+    monkeypatch.setattr(view, "picture", lambda shape, *_, title, **__: inputs.update({title: source(shape)}))
+    return inputs
+
+
+def with_inputs(folder: Path, *places: str) -> None:
+    """Programs in a folder ``res`` of inputs somewhere else, which are copied below ``in`` at these places."""
+    (folder / "res").mkdir()
+    for number, place in enumerate(places):
+        copy = folder / "in" / place
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        table(copy)
+        text = program_to_json(PROGRAM, FRAME, source=f"/elsewhere/{place}")
+        (folder / "res" / f"{number}.json").write_text(text)
+
+
+def test_the_input_of_several_with_its_name_is_that_with_most_of_its_path(
+    run: Run, tmp_path: Path, shown: dict[str, Path | None]
+):
+    places = ["a/x.obj", "b/x.obj", "b/y.obj", "03001627/one/models/m.obj", "03001627/two/models/m.obj"]
+    with_inputs(tmp_path, *places)
+    ended = run("sheet", "res", "s.png", "--shape", "in")
+    assert {name: str(path) for name, path in shown.items()} == {str(n): f"in/{p}" for n, p in enumerate(places)}
+    assert "without their input" not in ended.err
+
+
+def test_none_of_several_inputs_that_fit_alike_is_shown_and_their_number_is_told(
+    run: Run, tmp_path: Path, shown: dict[str, Path | None]
+):
+    with_inputs(tmp_path, "a/x.obj", "a/y.obj", "a/z.obj")
+    for other in ("b/x.obj", "c/x.obj"):
+        (tmp_path / "in" / other).parent.mkdir()
+        table(tmp_path / "in" / other)
+    (tmp_path / "in" / "a" / "x.obj").unlink()
+    (tmp_path / "in" / "a" / "y.obj").unlink()
+    ended = run("sheet", "res", "s.png", "--shape", "in")
+    assert (ended.code, {name: bool(path) for name, path in shown.items()}) == (0, {"0": False, "1": False, "2": True})
+    assert "2 of 3 programs are shown without their input, such as 0: several files have its name" in ended.err
+    assert "it was not found" in ended.err
+    assert "several files have its name" in run("render", "res/0.json", "p.png", "--shape", "in").err
+    assert "without their input" not in run("sheet", "res", "s.png").err, "no input was asked for"
+
+
+def test_the_input_of_a_text_is_that_of_the_json_beside_it(run: Run, tmp_path: Path, shown: dict[str, Path | None]):
+    with_inputs(tmp_path, "a/x.obj")
+    export(PROGRAM, tmp_path / "res" / "0.shape", FRAME)
+    assert run("render", "res/0.shape", "p.png", "--shape", "in").code == 0
+    assert str(shown["0"]) == "in/a/x.obj"
+    (tmp_path / "res" / "0.json").unlink()
+    assert "no .json of its name" in run("render", "res/0.shape", "p.png", "--shape", "in").err
 
 
 def test_show_and_sheet_write_a_page_and_a_picture(run: Run, tmp_path: Path, program: Path):

@@ -16,6 +16,7 @@ import pytest
 
 from shapeprog import data
 from shapeprog.cli import main, writing
+from shapeprog.data import loading
 from shapeprog.errors import InputError, OutputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats import export, load_with_frame, save
@@ -155,8 +156,8 @@ def test_the_input_is_opened_only_beside_its_program_or_where_the_user_says(
     path = places / "results" / "one.json"
     path.write_text(program_to_json(PROGRAM, source=source.format(places)))
     opened: list[str] = []
-    monkeypatch.setattr(data, "load", lambda place: opened.append(str(place)) or PLATE)
-    found, _ = writing._input_and_scores(path, None, None if named is None else places / named)
+    monkeypatch.setattr(loading, "load", lambda place, **_: opened.append(str(place)) or PLATE)
+    found, *_ = writing._input_and_scores(path, None, None if named is None else places / named)
     assert (len(opened), found is not None) == ((1, True) if shown else (0, False))
 
 

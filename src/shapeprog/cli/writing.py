@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -142,7 +143,9 @@ def _draw(
     loaded, frame = terminal.read_program_file(program, changes)
     if not loaded.size:
         terminal.warn(program, "nothing is drawn: write a part below the size, such as box(height=2)")
-    shape, scores = _input_and_scores(program, frame, named, changes)
+    shape, scores, lacking = _input_and_scores(program, frame, named, changes)
+    if lacking:
+        terminal.note(f"The input is not shown: {lacking}. Give its file with --shape.")
     if output.suffix.lower() in PAGES:
         viewer(loaded, output, shape=shape, title=program.stem, scores=scores, frame=frame)
     else:
@@ -176,6 +179,7 @@ def sheet_command(
         raise InputError(f"there is no folder {shape}", "--shape takes the folder of the inputs")
     terminal.load_modules(modules)
     items: list[Item] = []
+    missing: dict[str, str] = {}
     failures: list[ShapeProgError] = []
     for path in program_files(folder)[:most]:
         try:
@@ -183,12 +187,18 @@ def sheet_command(
         except ShapeProgError as error:
             failures.append(error)
             continue
-        beside, scores = _input_and_scores(path, frame, shape, noted=False)
+        beside, scores, lacking = _input_and_scores(path, frame, shape)
+        if beside is None:
+            missing[path.stem] = lacking or "none is named in a .json"
         items.append(Item(path.stem, beside, loaded, scores_text(scores, loaded)[0]))
     if not items:
         terminal.finish(failures, terminal.MISTAKE)
     contact_sheet(items, output, columns=columns, title=title)
     terminal.say(f"wrote {output}: {len(items)} programs")
+    if missing and (shape is not None or len(missing) < len(items)):
+        causes, cure = "; ".join(dict.fromkeys(missing.values())), "--shape takes the folder of the inputs"
+        some = f"{len(missing)} of {len(items)} programs are shown without their input, such as {next(iter(missing))}"
+        terminal.note(f"{some}: {causes}. {cure}.", "yellow")
     terminal.finish(failures)
 
 
@@ -210,13 +220,13 @@ def statements_command(
 
 
 def _input_and_scores(
-    program: Path, frame: Frame | None, named: Path | None, changes: Sequence[str] | None = None, noted: bool = True
-) -> tuple[Shape | None, Mapping[str, float]]:
-    """The input of a program and the scores in its .json file, unless ``--set`` changes it.
+    program: Path, frame: Frame | None, named: Path | None, changes: Sequence[str] | None = None
+) -> tuple[Shape | None, Mapping[str, float], str]:
+    """The input of a program and the scores in its .json file, unless ``--set`` changes it; and why an input that is
+    named or recorded is not shown: a picture without the input is better than none.
 
     The input is the file that the user names, or the one that the .json file names.  The latter is opened only beside
-    the program, or in the folder that the user names and deeper: a program from elsewhere may name any file.  Where
-    there is none, a remark is printed if ``noted``: a picture without the input is better than none.
+    the program, or in the folder that the user names and deeper: a program from elsewhere may name any file.
     """
     from shapeprog.formats.json_form import Result, read_result
     from shapeprog.language.program import Program
@@ -224,16 +234,29 @@ def _input_and_scores(
     kept = not changes and program.suffix.lower() == ".json"
     result = read_result(program) if kept else Result(Program())
     if named is not None and not named.is_dir():
-        return _as_inferred(named, frame), result.scores
-    place, mark, member = (result.source or "").partition("#")
+        return _as_inferred(named, frame), result.scores, ""
+    if named is not None and not kept:  # the text may have been edited, so that the scores are of another program
+        with suppress(ShapeProgError):
+            result = Result(Program(), source=read_result(program.with_suffix(".json")).source)
+    if not result.source:
+        return None, result.scores, "" if named is None else "no .json of its name beside the program names one"
+    place, mark, member = result.source.partition("#")
     files = program.parent.iterdir() if named is None else named.rglob("*")
     same = sorted(file for file in files if file.name == Path(place).name and file.is_file() and not file.is_symlink())
+    agreeing = [_agreeing_parts(file, Path(place)) for file in same]  # others of its name are inputs of other programs
+    if agreeing.count(max(agreeing, default=0)) > 1:
+        return None, result.scores, "several files have its name, and none fits its path in the .json best"
     try:
-        return _as_inferred(f"{same[0]}{mark}{member}", frame), result.scores
-    except (IndexError, ShapeProgError):
-        if noted and (result.source or named):
-            terminal.note("The input is not shown: it was not found, or cannot be read. Give its file with --shape.")
-        return None, result.scores
+        best = same[agreeing.index(max(agreeing))]
+        return _as_inferred(f"{best}{mark}{member}", frame), result.scores, ""
+    except (ValueError, ShapeProgError):
+        return None, result.scores, "it was not found, or cannot be read"
+
+
+def _agreeing_parts(file: Path, source: Path) -> int:
+    """How many folders and names at the end of two paths are the same."""
+    same = [one == other for one, other in zip(file.absolute().parts[::-1], source.parts[::-1], strict=False)]
+    return [*same, False].index(False)
 
 
 def _as_inferred(path: Path | str, frame: Frame | None) -> Shape:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +13,13 @@ import pytest
 from commands import PROGRAM, Run, table
 
 from shapeprog import inference
-from shapeprog.cli.terminal import at
+from shapeprog.cli.terminal import assumed, at
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.named import names as named
 from shapeprog.language.parser import parse
+from shapeprog.language.readable import in_readable_unit
+from shapeprog.language.unit import Unit
+from shapeprog.space import Frame
 
 
 def cloud(path: Path) -> np.ndarray:
@@ -27,17 +32,42 @@ def cloud(path: Path) -> np.ndarray:
 
 
 @pytest.mark.usefixtures("quick")
-@pytest.mark.parametrize(
-    ("name", "assumed", "other"),
-    [("a.npy", "+y", "+z"), ("a.npz", "+y", "+z"), ("a.xyz", "+z", "+y"), ("a.ply", "+y", "+z")],
-)
-def test_an_assumed_up_axis_is_told_with_another_one(run: Run, tmp_path: Path, name: str, assumed: str, other: str):
+@pytest.mark.parametrize(("name", "usual"), [("a.npy", "+y"), ("a.npz", "+y"), ("a.xyz", "+z"), ("a.ply", "+y")])
+def test_an_assumed_up_axis_is_told_with_the_others(run: Run, tmp_path: Path, name: str, usual: str):
     points = cloud(tmp_path / name) if name.endswith("ply") else cloud(tmp_path / "table.obj")
     save = {"a.npy": np.save, "a.npz": lambda path, array: np.savez(path, points=array), "a.xyz": np.savetxt}
     save.get(name, lambda *_: None)(tmp_path / name, points)
     said = run("infer", name, "--no-picture").out
-    assert f"does not store the up axis: {assumed} is assumed. Another axis: --up {other}, or --up auto" in said
+    others = ", ".join(axis for axis in ("+x", "-x", "+y", "-y", "+z", "-z") if axis != usual)
+    assert f"does not store the up axis: {usual} is assumed. Another axis: --up with one of {others}; --up auto" in said
     assert "does not store" not in run("infer", name, "--no-picture", "--up", "+z").out
+
+
+@pytest.mark.usefixtures("quick")
+def test_what_is_assumed_is_told_once_in_a_batch_and_with_each_shape_in_json(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    other = inference.Result(parse(TABLE), None, {}, "Stopped at once.", (), seconds=0.1)
+    metric = in_readable_unit(other.program, Unit("cm", 3.0))
+    monkeypatch.setattr(inference, "infer", lambda *_, **__: replace(other, program=metric))
+    names = [table(tmp_path / name).name for name in ("a.stl", "b.ply", "c.stl", "d.ply")]
+    said = run("infer", *names, "--no-picture", "--unit", "cm").out
+    assert said.count("does not store the up axis: +z is assumed") == 1
+    assert said.count("does not store the up axis: +y is assumed") == 1
+    assert said.count("assumed to be m, so that the longest side is 2 m. Another unit: --file-unit mm") == 1
+    lines = run("infer", *names, "--no-picture", "--unit", "cm", "--json").out.splitlines()
+    for line in lines:
+        up, unit = json.loads(line)["notes"]
+        assert "does not store the up axis" in up
+        assert "assumed to be m" in unit
+    words = ["--no-picture", "--unit", "cm", "--json", "--file-unit", "mm", "--up", "+y"]
+    assert json.loads(run("infer", "a.stl", *words).out)["notes"] == []
+
+
+@pytest.mark.parametrize(("unit", "others"), [("mm", ["cm", "in"]), ("cm", ["mm", "in"]), ("m", ["mm", "cm", "in"])])
+def test_an_assumed_unit_is_told_with_all_others_that_are_likely(unit: str, others: list[str]):
+    hint = assumed(Frame(), unit).partition("Another unit: ")[2]
+    assert hint == " or ".join(f"--file-unit {name}" for name in others)
 
 
 @pytest.mark.usefixtures("quick")

@@ -85,7 +85,7 @@ def infer_command(
         statements="paper" if paper else "all", detail=detail, ties=not no_ties,
         libraries=terminal.load_libraries(modules, library), unit=unit or "",
     )  # fmt: skip
-    folder, stems, units = make_folder(out), set[str](), set[str]()
+    folder, stems, told = make_folder(out), set[str](), set[str]()
 
     def inferred(shape: Shape, progress: Callable[[str, float], None]) -> tuple[Result, list[str]]:
         """What was inferred from a shape, and the names of the files."""
@@ -117,11 +117,15 @@ def infer_command(
                     failures.append((path, terminal.fault("no program was inferred", error)))
                     continue
                 count += 1
+                assumptions = _assumptions(shape, result, up is None)
                 if as_json:
                     about = {"name": shape.name, "folder": str(folder), "seconds": result.seconds}
+                    about["notes"] = [*assumptions.values()]
                     terminal.print_json(about | json.loads(document(result, shape)))
                 elif not terminal.quiet:
-                    _report(path, shape, result, names, folder, up is None, units)
+                    new = [sentence for assumption, sentence in assumptions.items() if assumption not in told]
+                    told |= assumptions.keys()
+                    _report(path, shape, result, names, folder, new)
     except OutputError as error:
         raise OutputError(error.message, f"{error.hint}; {_kept(count, folder)}") from None
     except KeyboardInterrupt:
@@ -149,11 +153,25 @@ def _kept(count: int, folder: Path) -> str:
     return f"finished results are kept: {count} program{'s' if count != 1 else ''} in {folder}"
 
 
-def _report(
-    path: Path, shape: Shape, result: Result, names: list[str], folder: Path, default_up: bool, units: set[str]
-) -> None:
-    """Print a result; ``units`` are those that have been assumed, each of which is reported once."""
+def _assumptions(shape: Shape, result: Result, default_up: bool) -> dict[str, str]:
+    """Sentences on the up axis and the unit that are assumed of a file, by what is assumed, which is reported once."""
     from shapeprog.data.orientation import default_axes
+
+    sentences = {}
+    cloud, suffix = shape.kind == "points", "" if shape.source is None else shape.source.suffix.lower()
+    if default_up and shape.source is not None and suffix in (*TIPPED, *(ARRAYS if cloud else ())):
+        usual = default_axes(shape.source, cloud)[0]
+        others = ", ".join(f"{sign}{axis}" for axis in "xyz" for sign in "+-" if f"{sign}{axis}" != usual)
+        note = f"The format does not store the up axis: {usual} is assumed."
+        sentences[usual] = f"{note} Another axis: --up with one of {others}; --up auto estimates it"
+    unit = shape.file_unit or "m"
+    if result.program.unit and result.program.unit.name and not shape.states_unit:
+        sentences[unit] = terminal.assumed(shape.frame, unit)
+    return sentences
+
+
+def _report(path: Path, shape: Shape, result: Result, names: list[str], folder: Path, assumed: list[str]) -> None:
+    """Print a result, and what is assumed of its file."""
     from shapeprog.data.placement import SCAN
     from shapeprog.view.page import scores_text
 
@@ -163,16 +181,7 @@ def _report(
     if shape.kind != "mesh":
         kind = f"a point cloud; normals are estimated from up to {SCAN:,} points"
         console.print(f"Read as {'voxels' if shape.points is None else kind}.", style="dim")
-    cloud, suffix = shape.kind == "points", "" if shape.source is None else shape.source.suffix.lower()
-    if default_up and shape.source is not None and suffix in (*TIPPED, *(ARRAYS if cloud else ())):
-        usual = default_axes(shape.source, cloud)[0]
-        note = f"The format does not store the up axis: {usual} is assumed."
-        console.print(f"{note} Another axis: --up {'+y' if usual == '+z' else '+z'}, or --up auto", style="dim")
     terminal.print_program(result.program)
-    unit = shape.file_unit or "m"
-    if result.program.unit and result.program.unit.name and not shape.states_unit and unit not in units:
-        units.add(unit)
-        console.print(terminal.assumed(shape.frame, unit), style="dim")
-    lines = [*scores_text(result.scores | {"seconds": result.seconds}, result.program), result.reason]
+    lines = [*assumed, *scores_text(result.scores | {"seconds": result.seconds}, result.program), result.reason]
     for line in (*lines, f"Wrote {', '.join(names)} in {folder}", ""):
         console.print(line, style="dim")

@@ -238,7 +238,8 @@ def assumed(frame: Frame, unit: str = "") -> str:
     longest = SPAN * frame.scale
     unit = unit or assumed_unit(longest)
     message = f"The unit of the file is assumed to be {unit}, so that the longest side is"
-    return f"{message} {longest * metres(unit):.3g} m. Another unit: --file-unit {'cm' if unit == 'mm' else 'mm'}"
+    others = " or --file-unit ".join(name for name in ("mm", "cm", "in") if name != unit)
+    return f"{message} {longest * metres(unit):.3g} m. Another unit: --file-unit {others}"
 
 
 def check_free(paths: Iterable[Path], overwrite: bool, own: Path | None = None) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from shapeprog.data import load
+from shapeprog.data import load, loading
 from shapeprog.data.orientation import AUTO, axes_of
-from shapeprog.data.uprightness import find_up, measures
+from shapeprog.data.uprightness import Upright, find_up, measures
 from shapeprog.formats.parts import solid
 from shapeprog.language.parser import parse
 from shapeprog.space import grid_axes
@@ -71,6 +71,14 @@ def test_what_is_the_same_from_all_sides_is_left_to_convention():
     np.testing.assert_allclose(np.ptp(measures(cube), 0), 0, atol=1e-12)
     assert find_up(cube, usual="-y").up == "-y"
     assert find_up(cube).probability == pytest.approx(1 / 6)
+
+
+@pytest.mark.parametrize(("probability", "doubted"), [(0.69, True), (0.71, False)])
+def test_an_up_axis_that_is_not_certain_is_to_be_checked(tmp_path, monkeypatch, probability: float, doubted: bool):
+    monkeypatch.setattr(loading, "find_up", lambda *_, **__: Upright("+z", probability))
+    note = load(written(tmp_path, CHAIR, "+z"), up="auto").note
+    assert f"(probability {probability:.0%})" in note
+    assert ("check it in a picture, or give --up" in note) == doubted
 
 
 def test_auto_counts_as_not_given_where_axes_are_checked():

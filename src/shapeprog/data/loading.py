@@ -183,6 +183,9 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
     return _Held(path, [name], lambda _: shape)
 
 
+CERTAIN = 0.7
+"""Probability of an estimated up axis from which it needs no check."""
+
 Place = Callable[..., Shape]
 """Makes a shape with the requested axes from a function of ``axes``; ``cloud=True`` for points in an array."""
 
@@ -194,7 +197,8 @@ def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., S
     estimate = find_up(
         default_shape.voxels, np.array(default_shape.frame.axes), usual=default_axes(path, cloud)[0], front=front
     )
-    note = f"Estimated up axis of the file: {estimate.up} (probability {estimate.probability:.0%})."
+    doubt = ": check it in a picture, or give --up" if estimate.probability < CERTAIN else ""
+    note = f"Estimated up axis of the file: {estimate.up} (probability {estimate.probability:.0%}){doubt}."
     shape = make(axes=axes_of(path, estimate.up, front, cloud))
     return replace(shape, note=f"{note} {shape.note}".rstrip())
 

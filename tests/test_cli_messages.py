@@ -122,9 +122,7 @@ def test_what_lies_in_one_plane_has_a_note(tmp_path: Path, leaning: float):
     (tmp_path / "square.obj").write_text(f"{corners}f 1 2 3 4\nv 5 5 5\n")
     for name in ("plane.npy", "square.obj"):
         assert load_shape(tmp_path / name).note == "The input is flat: all of it lies in one plane."
-        assert load_shape(tmp_path / name, up="auto").note.endswith(
-            "). The input is flat: all of it lies in one plane."
-        )
+        assert load_shape(tmp_path / name, up="auto").note.endswith(". The input is flat: all of it lies in one plane.")
     assert not load_shape(tmp_path / "solid.npy").note
 
 
@@ -272,6 +270,38 @@ def test_changes_with_which_parts_come_apart_or_vanish_are_told_with_the_range(
     assert not told("diameter=28", "inset=9")
     assert not told("n=1")
     assert "parts come apart or vanish" in told("n=1", "inset=-40")
+
+
+MANY = "width, depth, height = 9, 9, 9\n" + "".join(f"size_{n} = {n}\nbox(width=size_{n})\n" for n in range(1, 10))
+
+
+@pytest.mark.parametrize(
+    ("text", "change", "message", "hint"),
+    [
+        (
+            "TABLE",
+            "diamter=3",
+            "no name 'diamter'",
+            "did you mean diameter? its names are diameter, width, depth, height",
+        ),
+        ("TABLE", "q=3", "no name 'q'", "its names are diameter, width, depth, height, inset, n"),
+        ("MANY", "siz=3", "no name 'siz'", "size_5, size_6, size_7 and 2 more in its text"),
+        ("TABLE", "height=1", "with --set height=1: ", "height may be 2"),
+        ("TABLE", "height*=-1", "with --set height=-70: ", "height may be 2"),
+        ("TABLE", "inset=10cm", "'10cm' is not a number", "in the unit of the program"),
+        ("# unit: cm\nTABLE", "inset=10cm", "'10cm' is not a number", "in the unit of the program, cm"),
+        ("TABLE", "inset 10", "write --set inset=10", ""),
+        ("TABLE", "inset -1.5", "write --set inset=-1.5", ""),
+    ],
+)
+def test_a_wrong_change_is_told_with_its_name_and_what_is_allowed(
+    run: Run, tmp_path: Path, text: str, change: str, message: str, hint: str
+):
+    (tmp_path / "t.shape").write_text(text.replace("TABLE", TABLE).replace("MANY", MANY))
+    ended = run("export", "t.shape", "o.stl", "--set", *change.split())
+    assert ended.code == 2
+    assert message in ended.err
+    assert hint in ended.err
 
 
 def test_computed_numbers_have_as_many_digits_as_are_meaningful(run: Run, tmp_path: Path):

@@ -38,6 +38,8 @@ class Command(TyperCommand):
         words: list[str] = []
         for word in args:
             following = "--set" in words[-2:-1] and CHANGE.fullmatch(word)
+            if "--set" in words[-2:-1] and words[-1].isidentifier() and re.fullmatch(r"-?[\d.]+", word):
+                raise typer.BadParameter(f"write --set {words[-1]}={word}, with = between name and number.")
             words += ["--set", word] if following else [word]
         return super().parse_args(ctx, words)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from shapeprog.errors import InputError
+from shapeprog.errors import InputError, ShapeProgError
 
 if TYPE_CHECKING:
     from shapeprog.language.program import Program
@@ -26,11 +26,11 @@ def changed(program: Program, changes: Sequence[str]) -> tuple[Program, list[str
     InputError
         If a change is none.
     ShapeProgError
-        If the program has no such name, or cannot be drawn so.
+        If the program has no such name, or cannot be drawn so, with the range within which it can.
     """
     if not changes:
         return program, []
-    from shapeprog.language.named import loosened, names
+    from shapeprog.language.named import loosened, names, ranges_of
     from shapeprog.language.named import set as set_numbers
     from shapeprog.language.parameters import shortest
 
@@ -46,13 +46,25 @@ def changed(program: Program, changes: Sequence[str]) -> tuple[Program, list[str
             result = _APPLY[sign](wanted.get(name, values.get(name, number)), number)
             wanted[name] = float(f"{result:.{DIGITS}g}") if sign else result
         except ValueError:
-            raise InputError(f"{change!r}: {text!r} is not a number", "write a number such as 11 or 1.2") from None
+            unit = f", {program.unit.name}" if program.unit and program.unit.name else ""
+            cure = f"write a number such as 11 or 1.2; lengths are in the unit of the program{unit}"
+            raise InputError(f"{change!r}: {text!r} is not a number", cure) from None
         except ZeroDivisionError:
             raise InputError(f"{change!r} divides by zero", "divide by another number") from None
-    edited = set_numbers(program, wanted)
+    numbers = ", ".join(f"{name}={number:g}" for name, number in wanted.items())
+    try:
+        edited = set_numbers(program, wanted)
+    except ShapeProgError as error:
+        if not wanted.keys() <= values.keys():
+            raise
+        hint = f"{error.hint}{_allowed(ranges_of(program, wanted))}"
+        raise ShapeProgError(f"with --set {numbers}: {error.message}", hint) from None
     if (ranges := loosened(program, edited, wanted)) is None:
         return edited, []
+    return edited, [f"with {numbers}: parts come apart or vanish{_allowed(ranges)}"]
+
+
+def _allowed(ranges: Mapping[str, tuple[float, float]]) -> str:
+    """The end of a sentence that names the ranges of names, if there are any."""
     known = [f"{name} may be {low + 0.0:.4g} to {high + 0.0:.4g}" for name, (low, high) in ranges.items()]
-    while_others = f"; while the other numbers are as they are, {', '.join(known)}" if known else ""
-    numbers = ", ".join(f"{name}={number:g}" for name, number in wanted.items())
-    return edited, [f"with {numbers}: parts come apart or vanish{while_others}"]
+    return f"; while the other numbers are as they are, {', '.join(known)}" if known else ""

@@ -21,6 +21,7 @@ from shapeprog.language.unroll import on_numpy_if_shipped, unroll
 FARTHEST = 3.0  # multiple of a number up to which it is tried
 LEAST = 1.0  # magnitude assumed for smaller numbers, in cells
 STEPS, HALVINGS = 4, 4  # values tried on either side of a number, and bisections between the last good and first bad
+LISTED = 10  # names that are listed where there are many
 MOST = 256  # most primitives of a program whose contacts are examined
 
 
@@ -98,7 +99,10 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
     declared = source.numbers
     for name in replacements:
         if name not in declared:
-            hint = did_you_mean(name, declared) if declared else "it has no names: write name = number at its top"
+            more = f" and {len(declared) - LISTED} more in its text" if len(declared) > LISTED else ""
+            known = f"its names are {', '.join([*declared][:LISTED])}{more}"
+            hint = f"{did_you_mean(name, declared, ' ')} {known}".strip()
+            hint = hint if declared else "it has no names: write name = number at its top"
             raise ShapeProgError(f"this program has no name {name!r}", hint)
         number = replacements[name]
         if not abs(number_of(number)) <= LARGEST:  # true of NaN, too
@@ -123,13 +127,17 @@ def loosened(program: Program, edited: Program, changed: Collection[str]) -> dic
 
     ``None`` if it holds together as the program did, or has too many parts to tell.
     """
-    numbers = [named for named in names(program) if named.name in changed]
     with on_numpy_if_shipped(program):
         check = _Check(program)
-        whole = any(number.whole for number in numbers)
+        whole = any(number.whole for number in names(program) if number.name in changed)
         if edited.size > check.most or all(check.fits([edited], [whole])):
             return None
-    return _ranges(program, [number for number in numbers if number.free])
+    return ranges_of(program, changed)
+
+
+def ranges_of(program: Program, changed: Collection[str]) -> dict[str, tuple[float, float]]:
+    """The :attr:`Named.range` of some names, as far as they are free."""
+    return _ranges(program, [named for named in names(program) if named.name in changed and named.free])
 
 
 # ---- ranges ---------------------------------------------------------------------------------------------------------

@@ -263,13 +263,34 @@ def test_changes_with_which_parts_come_apart_or_vanish_are_told_with_the_range(
 
     low, high = named(parse(TABLE))[0].range or (0, 0)
     expected = f"diameter may be {low:.4g} to {high:.4g}"
-    assert "warning: t.shape, with diameter=28: parts come apart or vanish; " in told("diameter=28")
+    assert "warning: t.shape, with diameter=28: parts come apart: leg (4 times); " in told("diameter=28")
     assert expected in told("diameter=28")
     assert "inset may be" not in told("diameter=28")
     assert not told("diameter=300")  # beyond what is tried for the range, but in one piece
     assert not told("diameter=28", "inset=9")
     assert not told("n=1")
-    assert "parts come apart or vanish" in told("n=1", "inset=-40")
+    assert "parts come apart: leg; " in told("n=1", "inset=-40")
+
+
+EDGES = """\
+width, depth, height = 20, 10, 20
+step = 4
+top(top=0, height=2)
+for _ in translate(3, x=step):
+    leg(left=0, width=2, front=0, depth=2)
+block(left=step * 2 + 2, front=2, depth=2, width=2, height=4)
+"""
+
+
+def test_parts_that_come_off_are_named_if_the_program_was_one_solid_before(run: Run, tmp_path: Path):
+    """The block is flush with the last leg, or meets it along an edge only."""
+    (tmp_path / "whole.shape").write_text(EDGES.replace("step * 2 + 2", "8"))
+    (tmp_path / "loose.shape").write_text(EDGES)
+    ended = run("render", "whole.shape", "o.png", "--set", "step=3")
+    assert "with step=3: parts come apart: block" in ended.err
+    assert "may be" not in ended.err, "the range is that within which parts touch"
+    assert "come apart" not in run("render", "whole.shape", "o.png", "--set", "step=4").err
+    assert "come apart" not in run("render", "loose.shape", "o.png", "--set", "step=3").err
 
 
 MANY = "width, depth, height = 9, 9, 9\n" + "".join(f"size_{n} = {n}\nbox(width=size_{n})\n" for n in range(1, 10))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -18,8 +19,8 @@ _APPLY = {"": lambda _, number: number, "+": operator.add, "-": operator.sub, "*
 
 
 def changed(program: Program, changes: Sequence[str]) -> tuple[Program, list[str]]:
-    """The program with other numbers for some of its names, one change after another, and a warning where parts come
-    apart.
+    """The program with other numbers for some of its names, one change after another, and a warning that names the
+    parts that come apart.
 
     Raises
     ------
@@ -30,7 +31,7 @@ def changed(program: Program, changes: Sequence[str]) -> tuple[Program, list[str
     """
     if not changes:
         return program, []
-    from shapeprog.language.named import loosened, names, ranges_of
+    from shapeprog.language.named import loose_parts, loosened, names, ranges_of
     from shapeprog.language.named import set as set_numbers
     from shapeprog.language.parameters import shortest
 
@@ -59,9 +60,12 @@ def changed(program: Program, changes: Sequence[str]) -> tuple[Program, list[str
             raise
         hint = f"{error.hint}{_allowed(ranges_of(program, wanted))}"
         raise ShapeProgError(f"with --set {numbers}: {error.message}", hint) from None
-    if (ranges := loosened(program, edited, wanted)) is None:
+    ranges, loose = loosened(program, edited, wanted), Counter(loose_parts(program, edited))
+    if ranges is None and not loose:
         return edited, []
-    return edited, [f"with {numbers}: parts come apart or vanish{_allowed(ranges)}"]
+    named = ", ".join(word if count == 1 else f"{word} ({count} times)" for word, count in loose.items())
+    trouble = f"parts come apart: {named}" if loose else "parts come apart or vanish"
+    return edited, [f"with {numbers}: {trouble}{_allowed(ranges or {})}"]
 
 
 def _allowed(ranges: Mapping[str, tuple[float, float]]) -> str:

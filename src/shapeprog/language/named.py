@@ -8,7 +8,9 @@ from functools import cache
 
 from shapeprog.arguments import number_of
 from shapeprog.errors import ShapeProgError, did_you_mean
+from shapeprog.geometry.arrays import array
 from shapeprog.geometry.contacts import contact_groups
+from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.language.ast import Assignment, Fault, Line, Source
 from shapeprog.language.dimensions import counted_names
 from shapeprog.language.evaluate import evaluated
@@ -16,7 +18,7 @@ from shapeprog.language.expression import names_in, text_of
 from shapeprog.language.parameters import LARGEST, to_float32
 from shapeprog.language.printer import printed
 from shapeprog.language.program import Program
-from shapeprog.language.unroll import on_numpy_if_shipped, unroll
+from shapeprog.language.unroll import exact_scene, on_numpy_if_shipped, unroll
 
 FARTHEST = 3.0  # multiple of a number up to which it is tried
 LEAST = 1.0  # magnitude assumed for smaller numbers, in cells
@@ -133,6 +135,20 @@ def loosened(program: Program, edited: Program, changed: Collection[str]) -> dic
         if edited.size > check.most or all(check.fits([edited], [whole])):
             return None
     return ranges_of(program, changed)
+
+
+def loose_parts(program: Program, edited: Program) -> list[str]:
+    """The words of parts that are not one solid with the largest part any more, if the program was one solid.
+
+    None where there are too many parts to tell.
+    """
+    if max(program.size, edited.size) > MOST:
+        return []
+    with exact_scene(program) as before, exact_scene(edited) as after:
+        loose = pieces_of_parts(after) > 0
+        if not loose.any() or pieces_of_parts(before).any():
+            return []
+        return [edited.draws[block].word for block in array(after.block)[loose]]
 
 
 def ranges_of(program: Program, changed: Collection[str]) -> dict[str, tuple[float, float]]:

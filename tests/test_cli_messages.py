@@ -350,3 +350,14 @@ def test_a_program_that_draws_nothing_is_told(run: Run, tmp_path: Path, words: l
     (tmp_path / "t.shape").write_text("width, depth, height = 8, 8, 24\n")
     ended = run(words[0], "t.shape", words[1])
     assert "warning: t.shape, nothing is drawn" in ended.err
+
+
+@pytest.mark.parametrize("words", [["render", "o.png"], ["show", "o.html"], ["export", "o.stl"]])
+@pytest.mark.parametrize("text", ["", "\n# a chair\n"])
+def test_an_empty_program_is_an_error_that_tells_how_programs_begin(
+    run: Run, tmp_path: Path, words: list[str], text: str
+):
+    (tmp_path / "t.shape").write_text(text)
+    ended = run(words[0], "t.shape", words[1])
+    assert (ended.code, "is empty\nhint: begin with width, depth, height = ..." in ended.err) == (2, True)
+    assert not (tmp_path / words[1]).exists()

@@ -13,6 +13,7 @@ from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 
 LEG = "leg(at=(1, 2, 3), size=(1, 2, 3))"
+SIZE = "width, depth, height = 4, 4, 4"
 
 PINNED = [
     (
@@ -156,6 +157,14 @@ def test_messages(text: str, message: str) -> None:
         ("leg(" * 300 + ")" * 300, 1, 804, "too many nested"),
         ("import os", 1, 1, "no statement"),
         ("pass", 1, 1, "not declare its size"),
+        ("# unit: cm\n", 1, 1, "not declare its size"),
+        (f"{SIZE}\n    box()", 2, 5, "unexpected indent"),
+        (f"{SIZE}\nfor _ in mirror(x=0):\nbox()", 3, 1, "expected an indented block"),
+        (f"{SIZE}\nfor _ in mirror(x=0):\n    box()\n  box(left=0)", 4, 3, "unindent.*\n.*\n {4}\\^"),
+        (f"{SIZE}\nbox(width=leg_width)", 2, 11, "did you mean width\\? or declare it above: leg_width = "),
+        (f"{SIZE}\nbox(width=q)\nq = 3", 2, 11, "hint: declare it above: q = "),
+        ("width, depth, height = 4", 1, 1, "3 names for 1 number\n"),
+        ("width, = 4, 5", 1, 1, "1 name for 2 numbers\n"),
     ],
 )
 def test_places(text: str, line: int, column: int, words: str) -> None:

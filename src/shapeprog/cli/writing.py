@@ -137,10 +137,13 @@ def _draw(
     program: Path, output: Path, named: Path | None, changes: Sequence[str] | None, modules: Sequence[Path] | None
 ) -> None:
     """Write a picture or a page of a program, beside its input."""
+    from shapeprog.language.reader import BEGIN
     from shapeprog.view import picture, viewer
 
     terminal.load_modules(modules)
     loaded, frame = terminal.read_program_file(program, changes)
+    if not loaded.size and not loaded.body and loaded.scale is None:
+        raise InputError(f"{program} is empty", f"{BEGIN} and a part below it, such as box(height=2)")
     if not loaded.size:
         terminal.warn(program, "nothing is drawn: write a part below the size, such as box(height=2)")
     shape, scores, lacking = _input_and_scores(program, frame, named, changes)

@@ -14,6 +14,7 @@ from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.geometry.mesh import joined, part_meshes, triangle_normals, union_mesh
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
+from shapeprog.language.reader import BEGIN
 from shapeprog.language.unroll import exact_scene
 from shapeprog.space import Frame
 
@@ -96,7 +97,8 @@ def solid(program: Program, frame: Frame | None = None) -> tuple[Vertices, Faces
             vertices, faces = union_mesh(scene)
     except ShapeProgError as error:
         if not program.body:
-            raise OutputError("this program is empty", "write a part below its size, such as box(height=2)") from error
+            cure = "write a part below its size" if program.scale else f"{BEGIN} and a part below it"
+            raise OutputError("this program is empty", f"{cure}, such as box(height=2)") from error
         raise OutputError(f"this program makes no solid: {error.message}", error.hint) from error
     return placed(vertices, frame), faces
 

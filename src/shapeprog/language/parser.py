@@ -59,7 +59,7 @@ def parse(text: str, name: str = "<program>") -> Program:
     """
     whole = Text(text, name)
     tree = whole.tree()
-    if _is_in_cells(tree):
+    if _is_in_cells(tree) and (tree.body or not any(map(_UNIT.fullmatch, whole.lines))):
         return parse_cells(whole, tree)
     unit, lines = _unit(whole, tree)
     reader = _Reader(whole, tree, Comments(lines))

@@ -139,7 +139,8 @@ class Reader(ABC):
         target, value = node.targets[0], node.value
         targets = target.elts if isinstance(target, ast.Tuple) else [target]
         values = value.elts if isinstance(value, ast.Tuple) and isinstance(target, ast.Tuple) else [value]
-        message = f"{len(targets)} names for {len(values)} numbers"
+        held = (len(targets), "name"), (len(values), "number")
+        message = " for ".join(f"{count} {word}{'s' * (count != 1)}" for count, word in held)
         self.require(len(targets) == len(values), node, message, "write as many numbers as names")
         words = [getattr(name, "id", "") for name in targets]
         for name, word in zip(targets, words, strict=True):
@@ -225,7 +226,8 @@ class Reader(ABC):
         for name in value.names() if isinstance(value, Expression) else ():
             if name.name not in scope:
                 otherwise = f"declare it above: {name.name} = ..."
-                hint = did_you_mean(name.name, scope, otherwise) if scope else otherwise
+                near = did_you_mean(name.name, scope, " ").strip()
+                hint = f"{near} or {otherwise}" if near else otherwise
                 if is_reserved(name.name):
                     hint = f"{name.name} is a word of the language, not a number"
                 if name.name in SIZES:

@@ -28,6 +28,7 @@ _SYNTAX_HINTS = {
     "forgot a comma": "write numbers without a unit, and one part on a line",
     "expected ':'": "a loop, a group and a function end in a colon",
     "indented block": "indent the lines in a loop, group or function by four spaces",
+    "unindent": "begin a line in the column of its loop, group or function, or of the lines in it",
     "unexpected indent": "only lines in a loop, group or function are indented",
 }
 _SYNTAX_HINT = "a line is a part, name = number, for _ in ...:, with inside(...):, or def name(...):"
@@ -68,6 +69,8 @@ class Text:
         except SyntaxError as error:
             row = min(max(error.lineno or 1, 1), len(self.lines))
             column = min(max(error.offset or 1, 1), len(self.lines[row - 1]) + 1)
+            if (error.msg or "").startswith(("unindent", "unexpected indent")):
+                column = len(self.lines[row - 1]) - len(self.lines[row - 1].lstrip()) + 1
             message = (error.msg or "").split(";")[0].removeprefix("invalid syntax").strip(". ") or "unexpected word"
             hint = next((hint for words, hint in _SYNTAX_HINTS.items() if words in message), _SYNTAX_HINT)
             if mixed := _MIXED.search(self.lines[row - 1].partition("#")[0]):

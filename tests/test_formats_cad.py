@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib.util
 import math
+import re
 import shutil
 import xml.etree.ElementTree as xml
 import zipfile
@@ -159,9 +160,8 @@ def test_scripts_keep_loops_names_functions_roles_and_comments():
     scad, script = scad_text(parse(FORMS), FRAME).splitlines(), script_text(parse(FORMS), FRAME).splitlines()
     for line in (
         "// Every form of the language.",
-        "width = 50; // [0:1:100]",
         "// between doors",
-        "n = 3; // [1:1:10]",
+        "n = 3; // [1:1:3]",
         "inset = radius * 2;",
         "module tray(rim, floor_thickness = radius / 2) { // with a loose floor",
         "  inner = $width - 2 * rim;",
@@ -188,6 +188,24 @@ def test_scripts_keep_loops_names_functions_roles_and_comments():
         assert line in script
     assert scad.count("// between doors") == script.count("gap = 0.5  # between doors") == 1
     assert "module bent_rod" not in scad_text(parse(STOOL), FRAME)  # no more is defined than what is called
+
+
+@pytest.mark.parametrize("piece", ["chair", "office_chair", "desk_with_drawers"])
+def test_sliders_of_openscad_end_where_the_program_holds_together_and_take_its_numbers(piece: str):
+    program = sp.load(Path(__file__).parents[1] / "examples" / "pieces" / f"{piece}.shape")
+    program = sp.set(program, height=sp.names(program)[2].value + 0.3)
+    sliders = re.findall(
+        r"^(\w+) = (.*); // \[(.*):(.*):(.*)\]$", scad_text(program, FRAME).partition("/* [Q")[0], re.M
+    )
+    assert len(sliders) > 5
+    for name, *texts in sliders:
+        value, low, step, high = map(float, texts)
+        (named,) = (number for number in sp.names(program) if number.name == name)
+        assert named.range is not None
+        assert named.range[0] - 1e-4 <= low <= value <= high <= named.range[1] + 1e-4
+        assert (value - low) / step == pytest.approx(round((value - low) / step), abs=1e-6), "a slider moves in steps"
+        for end in (low, high):
+            assert sp.set(program, {name: end}).size
 
 
 def test_words_of_a_script_are_no_names_of_numbers(tmp_path: Path):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from decimal import Decimal
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from shapeprog.language.ast import (
     note_of,
 )
 from shapeprog.language.expression import Expression, text_of
+from shapeprog.language.named import MOST, Named
+from shapeprog.language.parameters import shortest
 from shapeprog.language.placement import BOX, ROUND, SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import Frame
@@ -38,6 +41,8 @@ cube sphere cylinder polyhedron square circle polygon text import projection sur
 union difference intersection hull minkowski translate rotate scale resize mirror multmatrix color offset
 linear_extrude rotate_extrude children intersection_for assign child echo roof
 """
+
+SLACK = 1e-3  # of a step, within which an end is at a whole step: ends are float32
 
 _GROUPS = {"mirror": "mirrored", "rotate": "rotated", "translate": "translated"}
 """Names of groups that OpenSCAD has for other modules."""
@@ -60,7 +65,7 @@ def scad_text(program: Program, frame: Frame, unit: str = "") -> str:
     if made.unit:
         lines += [f"// Numbers are in {made.unit}{f', the model is in {unit}' if unit else ''}."]
     lines += ["", f"/* [Numbers{f', in {made.unit}' if made.unit else ''}] */"] if made.numbers else []
-    lines += [text for entry in made.numbers for text in _number(entry, made.counts)]
+    lines += [text for entry in made.numbers for text in _number(entry, made.named, program.size <= MOST)]
     body = list(_model(made))
     if "segments" in (tools := "\n\n".join(needed(PRELUDE.strip().split("\n\n"), "\n".join(body)))):
         lines += ["", "/* [Quality] */", f"segments = {SEGMENTS}; // [12:4:128]"]
@@ -89,18 +94,25 @@ def _model(made: Script) -> Iterator[str]:
     yield "}"
 
 
-def _number(entry: Assignment | Comment, counts: Collection[str]) -> Iterator[str]:
-    """A named number, with the range of its slider if it is no expression; or a comment."""
+def _number(entry: Assignment | Comment, named: Mapping[str, Named], ranged: bool) -> Iterator[str]:
+    """A named number, with the range of its slider if it is no expression; or a comment.
+
+    If ``ranged``, the program holds together within the range, in steps of the last digit of the number or less.
+    """
     note = entry.text if isinstance(entry, Comment) else entry.note
     if note or isinstance(entry, Comment):
         yield f"// {note}" if note else ""
     for name, value in entry.numbers if isinstance(entry, Assignment) else ():
         slider = ""
         if not isinstance(value, Expression):
-            size, whole = abs(value), name in counts and value == round(value)
+            size, whole = abs(value), named[name].whole and value == round(value)
             step = 1.0 if whole else 10.0 ** math.floor(math.log10(max(size, 1e-6) / 20))
             far = 10 * step * math.ceil(max(size, step) / (5 * step))
             low, high = (-far, 0.0) if value < 0 else (min(value, 1.0) if whole else 0.0, far)
+            step = min(step, 10.0 ** int(Decimal(shortest(value)).as_tuple().exponent))
+            ends = named[name].range if ranged else None
+            if ends and ends[0] < ends[1]:  # a slider takes its start and whole steps from there
+                low, high = step * math.ceil(ends[0] / step - SLACK), step * math.floor(ends[1] / step + SLACK)
             slider = f" // [{':'.join(map(number, (low, step, high)))}]"
         yield f"{name} = {text_of(value)};{slider}"
 

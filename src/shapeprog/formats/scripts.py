@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,8 +27,8 @@ from shapeprog.language.ast import (
     without_double_blanks,
 )
 from shapeprog.language.convert import placed_if_possible
-from shapeprog.language.dimensions import counted_names
 from shapeprog.language.expression import Name, value_at
+from shapeprog.language.named import Named, names
 from shapeprog.language.placement import LONGEST_SIDE, SIZES
 from shapeprog.language.program import Program
 from shapeprog.space import FloatArray, Frame
@@ -47,8 +47,8 @@ class Script:
         Unit of the numbers in it; empty if it is not known.
     numbers
         Its named numbers, an assignment for each, and comments between them.
-    counts
-        Names of numbers that are counts.
+    named
+        What is known of those numbers by name, such as the range of each.
     lines
         Its functions, parts and groups, with free names.
     world
@@ -61,7 +61,7 @@ class Script:
 
     unit: str
     numbers: tuple[Assignment | Comment, ...]
-    counts: frozenset[str]
+    named: Mapping[str, Named]
     lines: tuple[Line, ...]
     world: FloatArray
     colours: dict[str, str]
@@ -92,10 +92,11 @@ def script(program: Program, frame: Frame, reserved: Collection[str], inner: str
     inner
         The prefix of ``width``, ``depth`` and ``height`` of a box inside of the whole.
     """
-    source = placed_if_possible(program).source
+    program = placed_if_possible(program)
+    source = program.source
     if source is None or not source.placed:
         meshes = tuple(parts(program, frame))
-        return Script("", (), frozenset(), (), np.eye(4), _colours({mesh.word for mesh in meshes}), meshes)
+        return Script("", (), {}, (), np.eye(4), _colours({mesh.word for mesh in meshes}), meshes)
     assert source.unit is not None
     words = _free_names([*sorted(names_of(source)), *source.functions], reserved)
     lines = tuple(_renamed(line, words, inner, False) for line in source.lines)
@@ -103,9 +104,9 @@ def script(program: Program, frame: Frame, reserved: Collection[str], inner: str
     kinds = {line.kind for line in source.walk() if isinstance(line, Part)}
     first = next((k for k, line in enumerate(lines) if not isinstance(line, Assignment | Comment)), len(lines))
     body = tuple(line for line in lines[first:] if not isinstance(line, Assignment))
-    counts = frozenset(words[name] for name in counted_names(source) & source.numbers.keys())
+    named = {words[number.name]: number for number in names(program)}
     world = world_of(source, frame)
-    return Script(source.unit.name, _numbers(lines, first), counts, body, world, _colours(roles | kinds))
+    return Script(source.unit.name, _numbers(lines, first), named, body, world, _colours(roles | kinds))
 
 
 def world_of(source: Source, frame: Frame) -> FloatArray:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -350,6 +352,24 @@ def test_a_program_that_draws_nothing_is_told(run: Run, tmp_path: Path, words: l
     (tmp_path / "t.shape").write_text("width, depth, height = 8, 8, 24\n")
     ended = run(words[0], "t.shape", words[1])
     assert "warning: t.shape, nothing is drawn" in ended.err
+
+
+@pytest.mark.parametrize("words", [["infer", "gone.obj", "gone.npz#1"], ["evaluate", "gone.shape", "gone.obj"]])
+def test_absent_inputs_are_told_before_heavy_modules_are_imported(tmp_path: Path, words: list[str]):
+    script = "import sys\nfrom shapeprog.cli import main\ntry:\n    main(sys.argv[1:])\nfinally:\n"
+    script += "    print({'numpy', 'torch', 'numba'} & sys.modules.keys())"
+    ended = subprocess.run([sys.executable, "-c", script, *words], cwd=tmp_path, capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout) == (2, "set()\n"), ended.stderr
+    assert f"there is no file {'or folder ' if words[0] == 'evaluate' else ''}{words[1]}\nhint: check" in ended.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["t.shape", "t.json"])
+def test_a_program_that_is_to_be_inferred_is_told_to_be_one(run: Run, tmp_path: Path, name: str):
+    (tmp_path / name).write_text(TABLE)
+    ended = run("infer", name)
+    assert (ended.code, f"{name}: no shapes are read" in ended.err) == (2, True)
+    assert "a program already: 'shapeprog render' draws it, 'shapeprog export' writes" in ended.err
 
 
 @pytest.mark.parametrize("words", [["render", "o.png"], ["show", "o.html"], ["export", "o.stl"]])

@@ -164,6 +164,8 @@ def evaluate_command(
     single target whatever their names. A program is compared in the axes of the input that its file stores, unless
     --up or --front is given.
     """
+    if absent := terminal.absent([predictions, *targets]):  # before imports that take a second
+        raise InputError(f"there is no file or folder {absent[0]}", "check the path")
     from rich.progress import track
 
     from shapeprog.data.parts import part_files
@@ -172,9 +174,6 @@ def evaluate_command(
 
     terminal.load_modules(modules)
     terminal.check_axes(up, front)
-    absent = [path for path in [predictions, *targets] if not Path(str(path).split("#")[0]).exists()]
-    if absent:
-        raise InputError(f"there is no file or folder {absent[0]}", "check the path")
     files = part_files(parts) if parts else {}
     shapes, failures = scoring.read_targets(targets, up, front, points, seed)
     listed = list(scoring.predictions(predictions, points, seed))

@@ -65,6 +65,9 @@ def infer_command(
     An input that cannot be read is reported at the end; the others are processed. A second run replaces the results of
     the first, unless a .shape file was edited. Results in a folder of inputs are no inputs.
     """
+    if terminal.absent(inputs) == inputs:  # before imports that take seconds
+        _complain([(path, InputError(f"there is no file {path}", "check the path")) for path in inputs], 0, as_json)
+        raise typer.Exit(terminal.MISTAKE)
     from shapeprog.cli.results import document, free_stem, measured, write
     from shapeprog.data import load_all
     from shapeprog.files import make_folder

@@ -208,6 +208,11 @@ def fault(what: str, error: Exception) -> ShapeProgError:
     return ShapeProgError(f"{what}: internal error", "run again with --debug and report the traceback")
 
 
+def absent(paths: Sequence[Path]) -> list[Path]:
+    """Those of paths, such as ``file.npz#12``, at which there is no file or folder."""
+    return [path for path in paths if not (os.path.exists(path) or os.path.exists(str(path).rpartition("#")[0]))]
+
+
 def check_axes(up: str | None, front: str | None) -> None:
     """Refuse axes that are none before the first file is read; an ``InputError`` if a name is not an axis, or both lie
     on one line."""

@@ -19,6 +19,7 @@ from shapeprog.data.reading import BYTES, POINTS, check_count, check_file, in_wo
 from shapeprog.data.shape import Shape
 from shapeprog.data.uprightness import find_up
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.formats.format import suffixes
 from shapeprog.formats.shape import read_text
 from shapeprog.language.unit import metres
 from shapeprog.space import Array, Frame, axis_name
@@ -168,9 +169,9 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
     with in_words(path):
         check_file(path)
         if suffix.removeprefix(".") not in COMMON and suffix not in readable_suffixes():
-            suffixes = ", ".join(sorted(readable_suffixes()))
+            cures = dict.fromkeys(suffixes("program"), PROGRAM) | {".3mf": "pip install lxml networkx"}
             ending = f"that end in {suffix!r}" if suffix else "without a suffix"
-            cure = "pip install lxml networkx" if suffix == ".3mf" else f"known: {suffixes}"
+            cure = cures.get(suffix, f"known: {', '.join(sorted(readable_suffixes()))}")
             raise InputError(f"{path.name}: no shapes are read from files {ending}", cure)
         axes_of(path, up, front)  # wrong axes are reported before the file is read
         make_shape, name = partial(_placed, path, up, front), _name(path)
@@ -182,6 +183,8 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
             shape = _shape_of(*read_mesh(path), path, name, make_shape, points, seed)
     return _Held(path, [name], lambda _: shape)
 
+
+PROGRAM = "this is a program already: 'shapeprog render' draws it, 'shapeprog export' writes a mesh of it"
 
 CERTAIN = 0.7
 """Probability of an estimated up axis from which it needs no check."""

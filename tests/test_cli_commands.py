@@ -412,6 +412,7 @@ def test_statements_prints_the_manual(run: Run):
     assert "width, depth, height = " in run("statements").out
     assert run("statements", "divide").out.startswith("for _ in divide(")
     assert "at(left=3, top=0)" in run("statements", "at").out
+    assert "  width, depth, height  two of these, across it" in run("statements", "bar").out
     ended = run("statements", "bak")
     assert (ended.code, "did you mean back?" in ended.err) == (2, True)
 

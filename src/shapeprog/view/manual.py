@@ -58,10 +58,12 @@ def _placed_page(name: str) -> str:
         keywords = tuple(dict.fromkeys(word for needs in needed for word in (*needs.required, *needs.optional)))
         keywords = (*(BOX if name in IN_BOX else ()), *keywords)
         example = f"{name}({', '.join(f'{word}=_' for word in needed[0].required or ('left', *SIZES[::2]))})"
-    plain = " ".join(word for word in keywords if word not in _DOCS)
-    placed = [f"  {plain}"] if plain else []
-    words = _table({word: _DOCS[word] for word in keywords if word in _DOCS})
-    return "\n".join([example, "", f"  {_DOCS[name].capitalize()}.", "", *placed, *words]) + "\n"
+    plain = [word for word in keywords if word not in _DOCS]
+    words = {word: _DOCS[word] for word in keywords if word in _DOCS}
+    placed = [f"  {' '.join(plain)}"] if plain else []
+    if plain == [*SIZES]:  # of a bar
+        placed, words = [], {", ".join(SIZES): "two of these, across it: width and depth if it rises"} | words
+    return "\n".join([example, "", f"  {_DOCS[name].capitalize()}.", "", *placed, *_table(words)]) + "\n"
 
 
 def _role_page(role: Role) -> str:

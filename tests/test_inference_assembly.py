@@ -17,7 +17,7 @@ from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats.parts import parts, solid
 from shapeprog.geometry.batch import Solids
-from shapeprog.inference.assembly import Assembly, _unharmed, assemble
+from shapeprog.inference.assembly import Assembly, _pruned, _unharmed, assemble
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import distinct, images, profiles, repeated
 from shapeprog.inference.choice.coverage import Coverage
@@ -350,3 +350,18 @@ def test_inference_tells_what_it_explains_and_what_more_would_cost():
     published = sp.infer(shape, statements="paper")
     assert published.snapped is not None
     assert all(language()[node.name].taught for node in published.program.walk())
+
+
+def test_blocks_inside_others_and_copies_are_pruned_but_not_what_connects() -> None:
+    whole = parse("box(at=(6, -6, -12), size=(1, 12, 24))\nbox(at=(-12, -1, -1), size=(18, 2, 2))")
+    inner = parse("box(at=(6.3, -4, -8), size=(0.4, 8, 16))")
+    coverage = Coverage(evidence_of_program(whole))
+    longer = Program((*whole.body, *inner.body, whole.body[0]))
+    assert sorted(map(str, _pruned(longer, coverage).body)) == sorted(map(str, whole.body))
+    assert _pruned(whole, coverage) == whole
+
+
+def test_a_ladder_of_thirty_rungs_has_each_rung_once() -> None:
+    rungs = "for i in translate(30, by=(0.774, 0, 0)):\n    box(at=(-11.226, -0.05, -0.6), size=(0.0774, 0.1, 1.18))"
+    ladder = f"{rungs}\nfor i in mirror(side):\n    box(at=(-12, -0.05, 0.59), size=(24, 0.1, 0.103))"
+    assert assembled(apart(ladder)).program.size == 32

@@ -2,14 +2,15 @@
 
 Pieces of the target become single blocks, and copies among them loops.  A first choice is fitted briefly, then competes
 with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored or shortened
-where that costs nothing, moved onto the planes of a mesh, drawn on its components, and connected again.  Then pairs of
-different roles are separated, and all parts get roles and an order.
+where that costs nothing, moved onto the planes of a mesh, drawn on its components, pruned, and connected again.  Then
+pairs of different roles are separated, and all parts get roles and an order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from shapeprog.inference.budget import NEVER, Deadline, Progress
@@ -18,7 +19,7 @@ from shapeprog.inference.candidates.loops import distinct, images, repeated, row
 from shapeprog.inference.candidates.neighbours import neighbours, recounted, residual_candidates, shorter
 from shapeprog.inference.candidates.singles import single_candidates
 from shapeprog.inference.choice.choice import choose, explained, missed, value
-from shapeprog.inference.choice.connecting import connected
+from shapeprog.inference.choice.connecting import connected, floating
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.planes import on_planes
@@ -58,7 +59,7 @@ def assemble(
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     fitted = on_planes(_unharmed(adjusted, start, coverage), evidence)
-    program = connected(snapped(fitted, evidence), coverage)
+    program = connected(_pruned(snapped(fitted, evidence), coverage), coverage)
     program = canonical_side(simplest(program))
     program = in_order(with_roles(separated(program, blocks)))
     count = len(program.body)
@@ -127,6 +128,18 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
         if (least > 0 or cheaper) and value(table, trial) > value(table, selected) + least:
             selected = trial
     return Program(tuple(nodes[option] for option in selected))
+
+
+def _pruned(program: Program, coverage: Coverage) -> Program:
+    """The program without blocks that cost more than they explain and connect no others, such as one that lies inside
+    another since they were fitted."""
+    table, every = coverage.table(program.body), tuple(range(program.blocks))
+    fewer = [every[:index] + every[index + 1 :] for index in every]
+    for rest in sorted(fewer, key=partial(value, table), reverse=True):
+        left = Program(tuple(program.body[index] for index in rest))
+        if value(table, rest) > value(table, every) and len(floating(left)) <= len(floating(program)):
+            return _pruned(left, coverage)
+    return program
 
 
 def _reason(used: int, allowed: int, share: float, hidden: float, gain: float, others: Sequence[Node]) -> str:

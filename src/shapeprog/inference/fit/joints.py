@@ -80,7 +80,8 @@ def needs(poses: Poses, joints: Joints) -> tuple[Float[Tensor, " R"], Float[Tens
     gap, by_other, by_joints = slopes_to_slots(scene, second, at_joints.detach())
     gap = gap + 0.02  # into the other part, by more than rounding takes away
     upwards = torch.eye(3, dtype=points.dtype)[:1].expand(len(standing), 3)
-    (by_rows,) = torch.autograd.grad(points, rows, torch.cat([by_joints, upwards]))
+    # Of a sum, because gradients of vectors import SymPy.
+    (by_rows,) = torch.autograd.grad((points * torch.cat([by_joints, upwards])).sum(), rows)
     by_number = (by_rows[:, None] @ slopes[bearing])[:, 0]
     by_number[: len(second)] += (by_other[:, None] @ slopes[second])[:, 0]
     by_number[: len(second)][gap < 0] = 0.0  # on an axis the slope of a depth is no number

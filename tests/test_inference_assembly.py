@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from declared import LANGUAGE, without_the_paper
 import shapeprog as sp
 from shapeprog.data import load
 from shapeprog.data.placement import shape_from_mesh, shape_from_points
+from shapeprog.data.remarks import remark_on_size
 from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import evaluate_program
 from shapeprog.formats.parts import parts, solid
@@ -20,7 +22,7 @@ from shapeprog.geometry.batch import Solids
 from shapeprog.inference.assembly import Assembly, _pruned, _unharmed, assemble
 from shapeprog.inference.candidates.drawings import canonical_side, simplest
 from shapeprog.inference.candidates.loops import distinct, images, profiles, repeated
-from shapeprog.inference.choice.coverage import Coverage
+from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program
 from shapeprog.language import Draw, Language, Loop, Program, language, standard, statement, using
 from shapeprog.language.hints import Box
@@ -365,3 +367,16 @@ def test_a_ladder_of_thirty_rungs_has_each_rung_once() -> None:
     rungs = "for i in translate(30, by=(0.774, 0, 0)):\n    box(at=(-11.226, -0.05, -0.6), size=(0.0774, 0.1, 1.18))"
     ladder = f"{rungs}\nfor i in mirror(side):\n    box(at=(-12, -0.05, 0.59), size=(24, 0.1, 0.103))"
     assert assembled(apart(ladder)).program.size == 32
+
+
+def test_what_is_left_out_at_a_side_of_the_target_is_chosen_in_a_second_run() -> None:
+    legs = (
+        "for i in mirror(side):\n    for j in mirror(depth):\n        cylinder(at=(-12, 5, 10), height=18, radius=0.08)"
+    )
+    evidence = evidence_of(whole(f"box(at=(6, -6, -12), size=(1.5, 12, 24))\n{legs}"))
+    prices = Prices(statement=0.05)  # more than legs of little surface are worth
+    alone = assemble(Coverage(evidence, replace(prices, side=1e-9))).program  # has no second run
+    again = assemble(Coverage(evidence, prices)).program
+    assert "is 8% as high as the input" in remark_on_size(unroll(alone), evidence.surface)
+    assert not remark_on_size(unroll(again), evidence.surface)
+    assert again.size == 5

@@ -124,6 +124,14 @@ def test_a_round_post_is_less_near_to_a_square_one():
     assert gains[1] < 0.75 * Prices.close
 
 
+def test_feet_of_thin_legs_count_as_a_side_of_the_target() -> None:
+    evidence = evidence_of(mesh_of(joined(TABLE)))
+    with_sides, without = (Coverage(evidence, prices).table(TABLE) for prices in (Prices(side=0.03), Prices()))
+    gains = [value(with_sides, chosen) - value(without, chosen) for chosen in ((0, 1, 2, 3), (0, 1, 2, 3, 4))]
+    assert gains[1] == pytest.approx(6 * 0.03, rel=0.02)  # each side counts as much as any other
+    assert gains[1] - gains[0] > 0.2 * 0.03  # one of four feet, and what the leg has of two more sides
+
+
 @pytest.mark.parametrize(
     ("block", "known"),
     [

@@ -10,10 +10,10 @@ import pytest
 
 import shapeprog as sp
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
-from shapeprog.data.remarks import doubt_of_furniture
+from shapeprog.data.remarks import doubt_of_furniture, remark_on_size
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
-from shapeprog.inference.surface.evidence import evidence_of, note_on_size
+from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.language.parser import parse
 from shapeprog.language.unroll import unroll
 
@@ -177,7 +177,7 @@ def test_separate_objects_and_hidden_surface_are_reported() -> None:
 
 
 def test_a_program_that_is_smaller_than_its_input_is_reported() -> None:
-    evidence = evidence_of(shape_from_mesh(*moved(CUBE, [4.0, 2, 1]), name="a box", axes=np.eye(3)))
+    surface = evidence_of(shape_from_mesh(*moved(CUBE, [4.0, 2, 1]), name="a box", axes=np.eye(3))).surface
     whole, half = (unroll(parse(f"box(at=(-12, -6, -3), size=({high}, 12, 6))")) for high in (24, 12))
-    assert not note_on_size(whole, evidence)
-    assert "is 50% as high as the input" in note_on_size(half, evidence)
+    assert not remark_on_size(whole, surface)
+    assert "is 50% as high as the input" in remark_on_size(half, surface)

@@ -1,4 +1,4 @@
-"""Remarks on inputs that may not be what inference is made for: one piece of furniture."""
+"""Remarks on inputs that may not be one piece of furniture, and on programs that differ from their input in size."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from shapeprog.geometry.scene import Scene
 from shapeprog.space import RESOLUTION, UP, BoolArray, FloatArray
 
 
@@ -35,3 +36,17 @@ def doubt_of_furniture(points: FloatArray, normals: FloatArray) -> str:
     # Less is true of mugs, bottles, cars and figures, and of 2 % of furniture (val), all of it wire or shells.
     why = f"{along:.0%} of its surface faces along an axis, and level surfaces cover {covered:.0%} of its plan"
     return "" if covered >= 0.35 or along >= 0.45 else f"This does not look like furniture: {why}."
+
+
+def remark_on_size(scene: Scene, points: FloatArray) -> str:
+    """A sentence about the size of a program if it differs from that of points (P, 3) of its input by more than a
+    tenth; else empty."""
+    there, extents = scene.mask.numpy(), np.ptp(points, axis=0)
+    if not there.any():
+        return ""
+    low, high = ((scene.centre + sign * scene.reach).numpy()[there] for sign in (-1, 1))
+    own = high.max(0) - low.min(0)
+    off = np.abs(own - extents) > np.maximum(0.1 * extents, 1.0)  # a sheet has no thickness
+    pairs = zip(np.array(["high", "deep", "wide"])[off], (own / np.maximum(extents, 1e-9))[off], strict=True)
+    sizes = " and ".join(f"{ratio:.0%} as {word}" for word, ratio in pairs)
+    return sizes and f"The program is {sizes} as the input: parts are missing, or differ from it."

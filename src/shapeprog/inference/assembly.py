@@ -3,7 +3,7 @@
 Pieces of the target become single blocks, and copies among them loops.  A first choice is fitted briefly, then competes
 with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored or shortened
 where that costs nothing, moved onto the planes of a mesh, drawn on its components, pruned, and connected again.  Then
-pairs of different roles are separated, and all parts get roles and an order.
+pairs of different roles are separated, and all parts get roles and an order.  A whole of another size is chosen again.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
+from shapeprog.data.remarks import remark_on_size
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest, solid_boxes
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
@@ -30,8 +31,10 @@ from shapeprog.inference.surface.evidence import Evidence
 from shapeprog.language.free import numbers
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Node, Program
+from shapeprog.language.unroll import unroll
 
 MOST_CANDIDATES = 1_500  # most candidates that are compared; half of them may be single blocks
+SIDE = 0.03  # price of each side of the target in a second choice, if the first program is a tenth too small
 LEAST_GAIN = 0.0005  # share of the surface from which another block is mentioned
 
 
@@ -66,7 +69,13 @@ def assemble(
     table = coverage.table([*program.body, *others[:1]])
     share, more = (explained(table, range(number)) for number in (count, len(table.prices)))
     hidden = float(evidence.weights[evidence.weights < evidence.weights.max()].sum())
-    return Assembly(program, share, _reason(count, blocks, share, hidden, more - share, others))
+    result = Assembly(program, share, _reason(count, blocks, share, hidden, more - share, others))
+    unlike = not coverage.prices.side and remark_on_size(unroll(program), evidence.surface)
+    if not unlike or deadline.passed("another choice that reaches the sides of the target"):
+        return result
+    coverage = Coverage(evidence, replace(coverage.prices, side=SIDE))
+    again = assemble(coverage, blocks=blocks, seed=seed, deadline=deadline, progress=progress)
+    return result if remark_on_size(unroll(again.program), evidence.surface) else again
 
 
 def _candidates(evidence: Evidence) -> list[Node]:
@@ -84,8 +93,7 @@ def _chosen(
     candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
 ) -> tuple[list[Node], list[Node]]:
     """A choice among a first one, one with a wide tolerance, their adjusted forms and neighbours, boxes around
-    unexplained points, and candidates passed over; and the others, those that would explain most of the rest first.
-    """
+    unexplained points, and candidates passed over; and the others, those that would explain most of the rest first."""
     evidence = coverage.evidence
     first, others = _choice(candidates, coverage, blocks, seed)
     if not first or deadline.passed("another choice among neighbours"):
@@ -131,8 +139,7 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
 
 
 def _pruned(program: Program, coverage: Coverage) -> Program:
-    """The program without blocks that cost more than they explain and connect no others, such as one that lies inside
-    another since they were fitted."""
+    """The program without blocks that cost more than they explain and connect nothing, such as one inside another."""
     table, every = coverage.table(program.body), tuple(range(program.blocks))
     fewer = [every[:index] + every[index + 1 :] for index in every]
     for rest in sorted(fewer, key=partial(value, table), reverse=True):
@@ -143,8 +150,7 @@ def _pruned(program: Program, coverage: Coverage) -> Program:
 
 
 def _reason(used: int, allowed: int, share: float, hidden: float, gain: float, others: Sequence[Node]) -> str:
-    """Why the program has so many blocks, which explain this share, and not also the first of the others; ``hidden`` is
-    the share of the surface that cannot be seen from outside."""
+    """Why the program has so many blocks, which explain this share, and not also the first of the others."""
     text = f"{used} drawing statement{'s cover' if used != 1 else ' covers'} {share:.0%} of the surface"
     text += f" ({hidden:.0%} is hidden inside)" * (hidden >= 0.1)
     if used >= allowed:

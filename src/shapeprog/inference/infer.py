@@ -18,7 +18,7 @@ from typing import Literal
 
 from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.data.loading import load
-from shapeprog.data.remarks import doubt_of_furniture, remark_on_pieces
+from shapeprog.data.remarks import doubt_of_furniture, remark_on_pieces, remark_on_size
 from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats.format import CELLS
@@ -34,7 +34,7 @@ from shapeprog.inference.cells.settings import Settings
 from shapeprog.inference.choice.coverage import Coverage, Prices
 from shapeprog.inference.fit.tunable import Tunable
 from shapeprog.inference.roles.roles import named_anew, note_on_front
-from shapeprog.inference.surface.evidence import evidence_of, note_on_size
+from shapeprog.inference.surface.evidence import evidence_of
 from shapeprog.inference.ties.tying import tie
 from shapeprog.kernels.compile import modules_of, prepare
 from shapeprog.language.convert import placed_if_possible
@@ -204,7 +204,7 @@ def infer(
             program = with_library(program, joined(libraries))
     program = in_readable_unit(program, unit_of_result(target, program, unit))
     front = note_on_front(program) if target.points is not None and statements == "all" else ""
-    size = note_on_size(unroll(program), evidence) if target.points is not None else ""
+    size = remark_on_size(unroll(program), evidence.surface) if target.points is not None else ""
     doubt = doubt_of_furniture(evidence.surface, evidence.surface_normals)
     reason = " ".join(filter(None, (reason, doubt, size, front, remark_on_pieces(target.voxels), target.note)))
     cut = tuple(deadline.cut for deadline in (searching, refining) if deadline.cut)

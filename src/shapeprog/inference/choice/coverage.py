@@ -7,6 +7,7 @@ A candidate is a program of one block.  All data for the selection is computed o
 *   points deep inside it, where it hides every other candidate;
 *   points of free space that it fills;
 *   parts of a mesh that one of its primitives draws;
+*   points near the sides of the box around the target that it explains;
 *   samples of its surface that the target does not support, or that face the other way than the target's.  They are
     charged by their area unless they are hidden inside a selected candidate, including other copies of the same one.
 """
@@ -46,9 +47,9 @@ class Prices:
     """Prices subtracted from the value of a program, in shares of the target explained; chosen on val.
 
     Each further block of a call costs as much as a loop; otherwise a box could be written as a drawer whose handle is
-    hidden.  The reward for parts separates drawers, since the gaps between them have little surface.  The reward for
-    close surface selects, among statements that explain the same points, the one with the shape of the target: a square
-    leg is not drawn as a round one.
+    hidden.  The reward for parts separates drawers, since the gaps between them have little surface; that for sides
+    draws thin legs; that for close surface selects, among statements that explain the same points, the one with the
+    shape of the target: a square leg is not drawn as a round one.
     """
 
     unsupported: float = 0.4  # of exposed surface that the target does not support, over the area of the target
@@ -58,6 +59,7 @@ class Prices:
     number: float = 0.0008  # of every continuous number in the text
     part: float = 0.004  # added for every part of a mesh, along the axes, that one primitive draws, 16 times at most
     implausible: float = 0.02  # of reaching beyond the box around the target, as one copy too many; of overlapping ones
+    side: float = 0.0  # added for all points near one side of the box around the target
     close: float = 0.015  # added for the share of the target within half a tolerance, with nearly the same normal
 
     def of(self, program: Program) -> float:
@@ -73,12 +75,12 @@ class Prices:
 class CoverageTable(NamedTuple):
     """Coverage of candidates, as rows of bits; each candidate has one word at the end.
 
-    ``rows`` (C, E + N + F + K + C) are the points that each candidate explains, those near its surface, the free points
-    that it fills, the parts that it draws, and the samples of every candidate that it hides.
+    ``rows`` (C, E + N + F + K + S + C) are the points that each candidate explains, those near its surface, free points
+    that it fills, parts that it draws, outermost points that it explains, and samples of every candidate that it hides.
     """
 
     rows: Bits
-    weights: FloatArray  # value of a bit of each of the first E + N + F + K words, negative for free points
+    weights: FloatArray  # value of a bit of each of the first E + N + F + K + S words, negative for free points
     evidence: int  # E, the number of words for points to be explained
     interior: Bits  # points deeper inside each candidate than the tolerance (C, E + N), which no other one explains
     exposed: Bits  # unsupported samples of the surface of each candidate that it does not hide itself (C,)
@@ -101,7 +103,9 @@ class Coverage:
         free = np.full(len(points), -self.prices.free * volume / max(evidence.area, 1e-9))
         straight = evidence.parts.straight
         parts = np.full(len(straight), self.prices.part / max(1.0, straight.sum() / SETTINGS.parts))
-        self._weights = np.concatenate(list(map(by_word, (evidence.weights[order], near, free, parts))))
+        outer = outermost(evidence)
+        self._outer, sides = sorted_by_cell(*outer), np.full(len(outer[0]), self.prices.side / WORD)
+        self._weights = np.concatenate(list(map(by_word, (evidence.weights[order], near, free, parts, sides))))
         self._surface = sorted_by_cell(evidence.surface, evidence.surface_normals)
         self._index: dict[Program, int] = {}
         self._rows: list[Array] = []
@@ -139,8 +143,9 @@ class Coverage:
         near, deeper = covers(scene, self._few, SETTINGS.near * evidence.tolerance, agreement)
         _, free = covers(scene, self._free, evidence.tolerance)
         parts = pack(np.any((off_parts(scene, evidence) <= evidence.tolerance) & evidence.parts.straight, 1))
+        sides, _ = covers(scene, self._outer, evidence.tolerance, evidence.agreement)
         interior = np.concatenate([interior, deeper], 1)
-        covered = np.concatenate([np.concatenate([explained, near], 1) & ~interior, free, parts], 1)
+        covered = np.concatenate([np.concatenate([explained, near], 1) & ~interior, free, parts, sides], 1)
         points, owners, areas = unsupported(scene, evidence, self._surface)
         number = np.bincount(owners, minlength=len(candidates))[:, None]
         sampled, slot = np.minimum(number, WORD), np.arange(WORD)
@@ -206,6 +211,14 @@ def free_points(evidence: Evidence) -> tuple[FloatArray, float]:
     selected = cells[np.sort(random.choice(len(cells), count, replace=False))]
     points = (selected + random.random((count, 3))) * side - HALF
     return points[np.argsort(nearby(points), kind="stable")], len(cells) * side**3 / max(count, 1)
+
+
+def outermost(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
+    """Points (S, 3) within a cell of each side of the box around the surface, as many for each, and their normals."""
+    points, low, high = evidence.points, evidence.surface.min(0) + 1.0, evidence.surface.max(0) - 1.0
+    sides = [np.flatnonzero(side) for side in np.concatenate([points <= low, points >= high], 1).T]
+    index = np.concatenate([side[np.linspace(0, len(side) - 1, WORD).astype(int)] for side in sides if len(side)])
+    return points[index], evidence.normals[index]
 
 
 def unsupported(scene: Scene, evidence: Evidence, binned: BinnedPoints) -> tuple[FloatArray, IntArray, FloatArray]:

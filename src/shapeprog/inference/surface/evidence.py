@@ -210,16 +210,3 @@ def looking(barrier: BoolArray, starts: FloatArray, steps: FloatArray, minimum: 
     data = barrier, np.ascontiguousarray(starts), ways, minimum, result
     over_threads(partial(look_out, *data), len(starts), least=1024)
     return result
-
-
-def note_on_size(scene: Scene, evidence: Evidence) -> str:
-    """A sentence about the size of a program if it differs from that of the target by more than a tenth; else empty."""
-    there, extents = scene.mask.numpy(), np.ptp(evidence.surface, axis=0)
-    if not there.any():
-        return ""
-    low, high = ((scene.centre + sign * scene.reach).numpy()[there] for sign in (-1, 1))
-    own = high.max(0) - low.min(0)
-    off = np.abs(own - extents) > np.maximum(0.1 * extents, 1.0)  # a sheet has no thickness
-    pairs = zip(np.array(["high", "deep", "wide"])[off], (own / np.maximum(extents, 1e-9))[off], strict=True)
-    sizes = " and ".join(f"{ratio:.0%} as {word}" for word, ratio in pairs)
-    return sizes and f"The program is {sizes} as the input: parts are missing, or differ from it."

@@ -65,11 +65,10 @@ def assemble(
     program = connected(_pruned(snapped(fitted, evidence), coverage), coverage)
     program = canonical_side(simplest(program))
     program = in_order(with_roles(separated(program, blocks)))
-    count = len(program.body)
     table = coverage.table([*program.body, *others[:1]])
-    share, more = (explained(table, range(number)) for number in (count, len(table.prices)))
+    share, more = (explained(table, range(number)) for number in (program.blocks, len(table.prices)))
     hidden = float(evidence.weights[evidence.weights < evidence.weights.max()].sum())
-    result = Assembly(program, share, _reason(count, blocks, share, hidden, more - share, others))
+    result = Assembly(program, share, _reason(program.blocks, blocks, share, hidden, more - share, others))
     unlike = not coverage.prices.side and remark_on_size(unroll(program), evidence.surface)
     if not unlike or deadline.passed("another choice that reaches the sides of the target"):
         return result
@@ -132,8 +131,7 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
     text = [(price, Program((node,)).size) for price, node in zip(table.prices, nodes, strict=True)]
     for option, (index, _, least) in enumerate(options, len(selected)):
         trial = (*selected[:index], option, *selected[index + 1 :])
-        cheaper = text[option] < text[selected[index]]
-        if (least > 0 or cheaper) and value(table, trial) > value(table, selected) + least:
+        if (least > 0 or text[option] < text[selected[index]]) and value(table, trial) > value(table, selected) + least:
             selected = trial
     return Program(tuple(nodes[option] for option in selected))
 
@@ -141,10 +139,12 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
 def _pruned(program: Program, coverage: Coverage) -> Program:
     """The program without blocks that cost more than they explain and connect nothing, such as one inside another."""
     table, every = coverage.table(program.body), tuple(range(program.blocks))
-    fewer = [every[:index] + every[index + 1 :] for index in every]
-    for rest in sorted(fewer, key=partial(value, table), reverse=True):
+    fewer = (every[:index] + every[index + 1 :] for index in every)
+    worth = [rest for rest in fewer if value(table, rest) > value(table, every)]
+    for rest in sorted(worth, key=partial(value, table), reverse=True):
         left = Program(tuple(program.body[index] for index in rest))
-        if value(table, rest) > value(table, every) and len(floating(left)) <= len(floating(program)):
+        loose = [len(floating(connected(each, coverage))) for each in (left, program)]
+        if loose[0] <= loose[1]:
             return _pruned(left, coverage)
     return program
 

@@ -88,7 +88,7 @@ def infer_command(
         statements="paper" if paper else "all", detail=detail, ties=not no_ties,
         libraries=terminal.load_libraries(modules, library), unit=unit or "",
     )  # fmt: skip
-    folder, stems, told = make_folder(out), set[str](), set[str]()
+    folder, stems, reported = make_folder(out), set[str](), set[str]()
 
     def inferred(shape: Shape, progress: Callable[[str, float], None]) -> tuple[Result, list[str]]:
         """What was inferred from a shape, and the names of the files."""
@@ -126,8 +126,8 @@ def infer_command(
                     about["notes"] = [*assumptions.values()]
                     terminal.print_json(about | json.loads(document(result, shape)))
                 elif not terminal.quiet:
-                    new = [sentence for assumption, sentence in assumptions.items() if assumption not in told]
-                    told |= assumptions.keys()
+                    new = [sentence for assumption, sentence in assumptions.items() if assumption not in reported]
+                    reported |= assumptions.keys()
                     _report(path, shape, result, names, folder, new)
     except OutputError as error:
         raise OutputError(error.message, f"{error.hint}; {_kept(count, folder)}") from None

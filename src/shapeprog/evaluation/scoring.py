@@ -82,7 +82,7 @@ def read_targets(
 
 
 def in_pose_of(prediction: Prediction, target: Shape, points: int, seed: int) -> Shape:
-    """The target in the axes that a predicted program stores, as it was inferred; as it is for other predictions."""
+    """The target, loaded again in the axes stored with a predicted program; unchanged for meshes and point clouds."""
     frame, path = None if isinstance(prediction, Shape) else prediction[2], path_of(target)
     if frame is None or path is None or np.allclose(frame.axes, target.frame.axes, atol=1e-6):
         return target

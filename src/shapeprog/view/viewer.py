@@ -101,15 +101,11 @@ def viewer(
             "lower the counts, or draw a picture",
         )
     given = None if shape is None else _input(shape)
-    points = np.concatenate([part.vertices for part in drawn] + [np.zeros((1, 3)) if given is None else given[0]])
-    low, high = points.min(0), points.max(0)
     target = Path(path)
     content = {
         "frame": frame_comment(frame, program),
         "title": title or (shape.name if shape is not None else target.stem),
         "facts": " · ".join(scores_text(scores, program)),
-        "middle": ((low + high) / 2).tolist(),
-        "radius": max(1.0, float(np.linalg.norm(high - low)) / 2),
         "lines": [_line(row) for row in listing(program, None)],
         "parts": [
             {"name": part.name, "block": part.block, "colour": [channel / 255 for channel in colour(part.word)]}

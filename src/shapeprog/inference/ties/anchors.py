@@ -132,15 +132,15 @@ class _AxisAnchors:
         # The cheapest choices, those nearest to either side, and each end from the nearer side.
         high = np.array([(each.low, each.high) for each in self.elements]).reshape(-1, 1, 2) > self.extent / 2
         away = (np.nan_to_num(np.abs(self.shifts - side), nan=np.inf).sum(2) for side in (0, 1, high))
-        starts = [scores.argmin(1) for scores in (self.costs, *away)]
-        _, best = min((self._descent(start) for start in starts), key=lambda result: round(result[0], 6))
-        # Only where parts may come apart: gaps in all directions take ten times as long as along the axis.
-        if len(self.leaning) and self._costs(best[None], exact=True) >= TIES.separated:
-            _, best = self._descent(best, exact=True)
+        states = np.array([self._descent(scores.argmin(1)) for scores in (self.costs, *away)])
+        costs = self._costs(states, exact=len(self.leaning) > 0).round(6)
+        best = states[costs.argmin()]
+        if len(self.leaning) and costs.min() >= TIES.separated:  # only then, as it takes ten times as long
+            best = self._descent(best, exact=True)
         return [choices[k] for choices, k in zip(self.choices, best[self.chosen_by], strict=True)]
 
-    def _descent(self, state: Array, *, exact: bool = False) -> tuple[float, Array]:
-        """The cost and state (K,) from which no change of an element is cheaper."""
+    def _descent(self, state: Array, *, exact: bool = False) -> Array:
+        """The state (K,) from which no change of an element is cheaper."""
         total, before, (count, most) = np.inf, None, self.costs.shape
         while total != before:
             before = total
@@ -150,7 +150,7 @@ class _AxisAnchors:
                 costs = self._costs(trials, exact=exact)
                 if costs.min() < total - 1e-9:
                     state, total = trials[costs.argmin()], float(costs.min())
-        return total, state
+        return state
 
     def _costs(self, states: Array, *, exact: bool = False) -> FloatArray:
         """The costs (S,) of choices of anchors (S, K); for ``exact`` see :meth:`_gaps`."""

@@ -57,7 +57,7 @@ class TieSettings:
     touch: float = 0.12  # gap up to which they touch
     side: float = 2.0  # of a copy of a part near a side of the whole that does not move with it
     resized: float = 2.0  # of a short part that changes its size, times how much it is below ``spanning``
-    thicker: float = 3.0  # of a board that changes its thickness
+    thicker: float = 6.0  # of a board that changes its thickness
     rigid: float = 5.0  # of a copy of a long part that keeps its size
     middle: float = 2.0  # of an end measured from the middle, where the middle of the part is not that of the whole
     farther: float = 3.0  # of an end measured from the farther of two sides, times how much farther, as a share

@@ -13,6 +13,7 @@ from shapeprog.inference.roles.roles import in_order, note_on_front, separated, 
 from shapeprog.language.hints import Box, straight_bar, upright_box
 from shapeprog.language.program import Draw, Program
 from shapeprog.language.statement import language
+from shapeprog.space import Frame, grid_axes
 
 CHAIR = """
 for i in mirror(side):
@@ -282,15 +283,22 @@ def test_a_chair_has_the_same_parts_whichever_way_it_faces(text: str, turns: int
 
 @pytest.mark.parametrize(
     ("side", "note"),
-    [("rear", ""), ("left", "on the left"), ("front", "in front"), ("right", "on the right"), ("bottom", "")],
+    [
+        ("rear", ""),
+        ("left", "on the left: if so, add --front +x"),
+        ("front", "in front: if so, add --front -z"),
+        ("right", "on the right: if so, add --front -x"),
+        ("bottom", ""),
+    ],
 )
 def test_a_back_that_is_not_behind_is_noted(side: str, note: str) -> None:
     size = "height" if side == "bottom" else "width" if side in ("left", "right") else "depth"
     back = "" if side == "bottom" else "bottom=45, "
     text = "width, depth, height = 50, 50, 90\nseat(bottom=40, height=5)\nfor _ in mirror(x=0, y=0):\n    "
     text += f"leg(left=0, width=4, front=0, depth=4, height=40)\nblock({back}{side}=0, {size}=4)\n"
-    assert note in (told := note_on_front(sp.parse(text)))
-    assert bool(note) == bool(told)
+    frame = Frame.of(1.0, (0, 0, 0), grid_axes("+y", "+z"))
+    assert note in (sentence := note_on_front(sp.parse(text), frame))
+    assert bool(note) == bool(sentence)
 
 
 def test_a_low_board_at_the_foot_of_a_bed_is_its_footboard_too() -> None:

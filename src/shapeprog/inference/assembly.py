@@ -156,6 +156,6 @@ def _reason(used: int, allowed: int, share: float, hidden: float, gain: float, o
     if used >= allowed:
         return f"{text}; this is the maximum, raise --blocks for more."
     if gain < LEAST_GAIN:
-        return f"{text}; no further statement would cover another {LEAST_GAIN:.2%}."
+        return f"{text}; no other candidate covers another {LEAST_GAIN:.2%}."
     more = numbers(Program(tuple(others[:1])))
     return f"{text}; one more would cover another {gain:.1%} with {more} more numbers: raise --detail to add it."

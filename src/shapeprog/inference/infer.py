@@ -203,7 +203,7 @@ def infer(
         if libraries:
             program = with_library(program, joined(libraries))
     program = in_readable_unit(program, unit_of_result(target, program, unit))
-    front = note_on_front(program) if target.points is not None and statements == "all" else ""
+    front = note_on_front(program, target.frame) if target.points is not None and statements == "all" else ""
     size = remark_on_size(unroll(program), evidence.surface) if target.points is not None else ""
     doubt = doubt_of_furniture(evidence.surface, evidence.surface_normals)
     reason = " ".join(filter(None, (reason, doubt, size, front, remark_on_pieces(target.voxels), target.note)))

@@ -24,7 +24,7 @@ from shapeprog.language.parameters import to_float32
 from shapeprog.language.program import Draw, Node, Program, nest
 from shapeprog.language.statement import language
 from shapeprog.language.unroll import unroll
-from shapeprog.space import DEPTH, SIDE, UP
+from shapeprog.space import DEPTH, SIDE, UP, Frame, axis_name
 
 Rule = tuple[str, Callable[[Parts], Mask]]
 
@@ -229,11 +229,12 @@ def _facing(scene: Scene) -> Parts:
     return max((parts, *(Parts(scene, turns) for turns in (2, 1, 3))), key=_leaned_on)  # unchanged where all are 0
 
 
-def note_on_front(program: Program) -> str:
+def note_on_front(program: Program, frame: Frame) -> str:
     """A sentence about the back of a seat or bed that is not behind; empty if it is, or there is none."""
     scene, sat_on = unroll(program), {"seat", "mattress"}.intersection(draw.word for draw in program.draws)
-    side = ("", "on the left", "in front", "on the right")[_facing(scene).turns if sat_on and scene.mask.any() else 0]
-    return side and f"Its back seems to be {side}: name the axis that its front faces with --front."
+    turns = _facing(scene).turns if sat_on and scene.mask.any() else 0
+    side, k, sign = (("", 0, 0), ("on the left", SIDE, -1), ("in front", DEPTH, 1), ("on the right", SIDE, 1))[turns]
+    return side and f"Its back seems to be {side}: if so, add --front {axis_name(sign * np.array(frame.axes)[:, k])}."
 
 
 def _leaned_on(p: Parts) -> float:

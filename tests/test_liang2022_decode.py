@@ -77,6 +77,14 @@ def test_targets_of_another_shape_are_refused(target: Tensor, message: str):
         decode(small(), targets(1), blocks=-1)
 
 
+def test_a_generator_in_training_mode_is_refused_and_stays_as_it_was():
+    generator = small().train()
+    before = {name: value.clone() for name, value in generator.state_dict().items()}
+    with pytest.raises(ShapeProgError, match=r"training mode\n  hint: call generator.eval\(\) first"):
+        decode(generator, targets(2))
+    assert all(torch.equal(value, before[name]) for name, value in generator.state_dict().items())
+
+
 def widened(cells: Tensor) -> Tensor:
     """Cells that share a face with a filled one, and these."""
     grid = cells[:, None].float()

@@ -66,12 +66,14 @@ def decode(
     """Decode a program of at most so many blocks K for each target, by a generator in evaluation mode.
 
     ``rng`` is the source of randomness for sampling, a fixed one by default.  Raises a ``ShapeProgError`` if there is
-    no such decoder, or the target has another shape.
+    no such decoder, the target has another shape, or the generator is in training mode.
     """
     check_tensor("target", target, "B", *[RESOLUTION] * 3, lead=False, floating=False)
     check_number("blocks", blocks, 0, whole=True)
     if decoder not in get_args(AnyDecoder):
         raise ShapeProgError(f"unknown decoder {decoder!r}", did_you_mean(decoder, get_args(AnyDecoder)))
+    if generator.training:  # it would normalise by the batch and change its running statistics
+        raise ShapeProgError("the generator is in training mode", "call generator.eval() first")
     size, device = len(target), target.device
     rng = (rng or torch.Generator(device)) if decoder.startswith("sample") else None
     ids = torch.zeros(size, blocks, STEPS, dtype=torch.long, device=device)

@@ -95,6 +95,14 @@ def test_a_truncated_pack_is_refused(tmp_path, shapes):
             load(f"{tmp_path}/p.npz#0")
 
 
+def test_a_file_of_another_format_is_called_no_pack_and_not_damaged(tmp_path):
+    trimesh.creation.box().export(tmp_path / "box.obj")
+    with pytest.raises(InputError, match=r"^box\.obj is no pack\n  hint: make packs with 'shapeprog prepare'"):
+        read_pack(tmp_path / "box.obj")
+    with pytest.raises(InputError, match="is a folder"):
+        read_pack(tmp_path)
+
+
 @pytest.fixture
 def directory(tmp_path):
     """Two synsets with eight boxes each, two of a kind, and one broken model."""

@@ -16,6 +16,7 @@ The last three may be missing.
 from __future__ import annotations
 
 import os
+import zipfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from shapeprog.data.arrays import members, read_head, read_numpy
-from shapeprog.data.reading import POINTS, check_count, few, in_words
+from shapeprog.data.reading import POINTS, check_count, check_file, few, in_words
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
 from shapeprog.files import atomic_path
@@ -91,8 +92,6 @@ class Pack:
 
 def is_pack(path: Path) -> bool:
     """Whether an NPZ file is a pack, by the shape of its ``voxels``; reads only the header of that array."""
-    import zipfile
-
     if path.suffix.lower() != ".npz" or not zipfile.is_zipfile(path):
         return False
     with zipfile.ZipFile(path) as archive:
@@ -124,6 +123,9 @@ def read_pack(path: str | os.PathLike[str], *, whole: bool = True) -> Pack:
     source = Path(path)
     if not source.exists():
         raise InputError(f"there is no pack {source}", "check the path, or make the pack with 'shapeprog prepare'")
+    check_file(source)
+    if source.suffix.lower() != ".npz" and not zipfile.is_zipfile(source):
+        raise InputError(f"{source.name} is no pack", _CURE)
     arrays = read_numpy(source, _ARRAYS)
     missing = {"ids", "voxels"} - set(arrays)
     if missing:

@@ -199,6 +199,12 @@ def test_every_shape_comes_once_before_any_comes_again(room: Path):
     assert torch.equal(next(iter(stream))[0], stream[0][0])
 
 
+def test_a_stream_takes_one_path_too(room: Path):
+    several = TargetStream([room / "few.npz"], 2, 50)[0]
+    for one in (room / "few.npz", str(room / "few.npz")):
+        assert all(map(torch.equal, TargetStream(one, 2, 50)[0], several))
+
+
 def test_the_ten_lines_of_the_manual_adapt(room: Path, tmp_path: Path):
     import shapeprog as sp
 

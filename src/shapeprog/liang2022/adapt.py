@@ -63,12 +63,18 @@ AdaptBatch: TypeAlias = tuple[Targets, TeacherForcingBatch | None]  # real shape
 
 
 class TargetStream:
-    """Endless batches of real shapes, a function of packs, seed and index; all shapes once before any comes again."""
+    """Endless batches of real shapes, a function of packs, seed and index; all shapes once before any comes again.
 
-    def __init__(self, packs: Sequence[str | Path], batch_size: int = 32, points: int = 1000, seed: int = 0) -> None:
+    ``packs`` is a path or several.
+    """
+
+    def __init__(
+        self, packs: str | Path | Sequence[str | Path], batch_size: int = 32, points: int = 1000, seed: int = 0
+    ) -> None:
         check_number("batch_size", batch_size, 1, whole=True)
         check_number("points", points, 1, whole=True)
-        self._shapes = [(pack, index) for pack in map(read_pack, map(Path, packs)) for index in range(len(pack))]
+        paths = [packs] if isinstance(packs, str | Path) else packs
+        self._shapes = [(pack, index) for pack in map(read_pack, paths) for index in range(len(pack))]
         if not self._shapes:
             raise ShapeProgError("there are no shapes to adapt to", "give packs made with: shapeprog prepare")
         self._batch_size, self._seed, self._points = batch_size, seed, points

@@ -118,6 +118,11 @@ def test_a_folder_belongs_to_one_process(tmp_path: Path):
     run(tmp_path, stop_at=1)
 
 
+def test_the_folder_may_be_text(tmp_path: Path):
+    next(train(Toy(), TOY, str(tmp_path / "run"), device="cpu"))
+    assert state(tmp_path / "run")["step"] == 0
+
+
 def test_a_loss_that_is_not_finite_ends_the_run(tmp_path: Path):
     toy = Toy()
     with torch.no_grad():

@@ -63,10 +63,10 @@ class Task(Protocol):
 
 
 def train(
-    task: Task, settings: TrainingSettings, folder: Path, *, device: str = "auto", restart: bool = False,
+    task: Task, settings: TrainingSettings, folder: str | Path, *, device: str = "auto", restart: bool = False,
     stop: threading.Event | None = None, command: str = "",
 ) -> Iterator[Record]:  # fmt: skip
-    """Train, yielding one record per step.
+    """Train, yielding one record per step: it goes on only while the records are read.
 
     The folder gets ``state.pt`` (weights, optimiser, step, settings) as it was before the first step, every two minutes
     and at the end, ``log.jsonl``, and after each validation ``weights.safetensors``, and ``best.safetensors`` where the
@@ -82,7 +82,8 @@ def train(
     optimiser = AdamW(weights, betas=(settings.beta1, 0.999), weight_decay=settings.weight_decay)
     together = settings.batch_size * world
     steps, step, best = math.ceil(settings.num_shapes / together), 0, -math.inf
-    with (make_folder(folder) / "lock").open("a") as stream:
+    folder = make_folder(folder)
+    with (folder / "lock").open("a") as stream:
         if rank == 0 and not lock(stream.fileno()):
             raise ShapeProgError(f"another process trains in {folder}", "wait for it, or choose another folder")
         if (folder / STATE).exists() and not restart:

@@ -65,6 +65,17 @@ def test_a_users_function_is_a_loss_and_faulty_ones_are_refused(monkeypatch: pyt
             loss(name)
 
 
+@pytest.mark.parametrize(("error", "told"), [(AssertionError(), "AssertionError"), (KeyError("a"), "KeyError: 'a'")])
+def test_whatever_a_users_loss_raises_is_told(error: Exception, told: str, monkeypatch: pytest.MonkeyPatch):
+    def faulty(compared: Comparison) -> Values:
+        raise error
+
+    monkeypatch.setitem(LOSSES, "faulty", faulty)
+    with pytest.raises(ShapeProgError) as caught:
+        compute(comparison(CUBE, [[0, 0, 0]]), {"faulty": 1.0})
+    assert caught.value.message == f"the loss 'faulty' raised {told}"
+
+
 def test_the_example_of_the_manual_costs_nothing_inside(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("shapeprog.liang2022.losses.LOSSES", dict(LOSSES))
     manual = Path(losses.__file__).with_name("README.md").read_text(encoding="utf-8")

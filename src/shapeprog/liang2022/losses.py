@@ -130,8 +130,9 @@ def compute(comparison: Comparison, weights: Mapping[str, float]) -> dict[str, V
     for name in [name for name in weights if name != NEURAL]:
         try:
             value = LOSSES[name](comparison)
-        except (AttributeError, IndexError, NameError, RuntimeError, TypeError, ValueError) as error:
-            raise ShapeProgError(f"the loss {name!r} raised {type(error).__name__}: {error}", "correct it") from error
+        except Exception as error:  # a function of a user may raise anything
+            cause = f"{type(error).__name__}: {error}".removesuffix(": ")
+            raise ShapeProgError(f"the loss {name!r} raised {cause}", "correct it") from error
         if value.shape != comparison.points.shape[:1]:
             message = f"the loss {name!r} returns values of shape {tuple(value.shape)}"
             raise ShapeProgError(message, f"return one for each of the {len(comparison.points)} shapes")

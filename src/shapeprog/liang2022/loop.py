@@ -124,8 +124,13 @@ def train(
                 write_text(folder / LOG, "")
                 begun = b""
             if not math.isfinite(total + norm):
-                cause = f"the loss of step {step + 1} is {total}, the norm of its gradient {norm}"
+                added = [(name, value) for name, value in zip(losses, parts, strict=True) if name[0] != "_"]
+                wrong = ", ".join(repr(name) for name, value in added if not math.isfinite(value))
+                by = f" because of {wrong}" if wrong else ""
+                cause = f"the loss of step {step + 1} is {total}{by}, the norm of its gradient {norm}"
                 cure = "start over with --restart and a lower learning rate"
+                if not step:  # no step was taken, so that the rate cannot be the reason
+                    cure = "correct the loss, the initial weights or the shapes, then start over with --restart"
                 raise ShapeProgError(cause, f"{cure}; {folder} holds the state of step {saved}" if rank == 0 else cure)
             optimiser.step()
             step += 1

@@ -98,6 +98,7 @@ def test_a_users_loss_adapts_and_an_interrupted_run_is_resumed_by_the_same_comma
         ([*ADAPT.split(), "--learn", "some"], "unknown learn 'some'"),
         ([*ADAPT.split(), "--device", "gpu"], "unknown device 'gpu'"),
         ([*ADAPT.split(), "--with", "gone.py"], "there is no file gone.py"),
+        ([*ADAPT.split(), "--with", "one.py", "--with", "two.py"], "the loss 'reach' is declared twice"),
         ([*ADAPT.split(), "--with", "table.obj"], "table.obj raised SyntaxError"),
         ([*ADAPT.split(), "--method", "guided", "--executor", "gone.safetensors"], "there is no file gone.safetensors"),
         (["paper", "infer", "few.npz", "--weights", "small.safetensors", "--decoder", "selct"], "did you mean select"),
@@ -108,6 +109,8 @@ def test_a_users_loss_adapts_and_an_interrupted_run_is_resumed_by_the_same_comma
     ],
 )
 def test_mistakes_are_explained_in_a_sentence(run: Run, here: Path, words: list[str], message: str):
+    for name in ("one.py", "two.py"):
+        (here / name).write_text(REACH)
     ended = run(*words)
     assert ended.code == 2
     assert message in " ".join(ended.err.split())

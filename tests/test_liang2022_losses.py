@@ -53,7 +53,7 @@ def test_a_users_function_is_a_loss_and_faulty_ones_are_refused(monkeypatch: pyt
     def reach(compared: Comparison) -> Values:
         return compared.scene.centre.norm(dim=-1).sum(-1)
 
-    loss("flat")(lambda compared: compared.points.sum())
+    flat = loss("flat")(lambda compared: compared.points.sum())
     weights = parse_losses("chamfer, reach=0.5")
     assert weights == {"chamfer": 1, "reach": 0.5}
     moved = comparison("leg(at=(2, 3, 0), size=(2, 2, 0))\n", [[0, 0, 0]])
@@ -62,7 +62,18 @@ def test_a_users_function_is_a_loss_and_faulty_ones_are_refused(monkeypatch: pyt
         compute(moved, {"flat": 1.0})
     for name in ("chamfer", "reach", NEURAL, "a=b"):
         with pytest.raises(DeclarationError, match=r"declared twice|cannot be the name"):
-            loss(name)
+            loss(name)(flat)
+
+
+def test_a_loss_that_is_declared_again_by_the_same_cell_replaces_itself(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("shapeprog.liang2022.losses.LOSSES", dict(LOSSES))
+    cell = """@loss("mine")\ndef mine(comparison):\n    return comparison.scene.centre.norm(dim=-1).sum(-1)"""
+    notebook = {"loss": loss, "__name__": "__main__"}
+    for _ in range(2):
+        exec(cell, notebook)
+    assert losses.LOSSES["mine"] is notebook["mine"]
+    with pytest.raises(DeclarationError, match="'mine' is declared twice"):
+        exec(cell, {"loss": loss, "__name__": "another"})
 
 
 @pytest.mark.parametrize(("error", "told"), [(AssertionError(), "AssertionError"), (KeyError("a"), "KeyError: 'a'")])

@@ -164,7 +164,7 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         for file in files or []:
             check_file(file)
             try:
-                runpy.run_path(str(file))
+                runpy.run_path(str(file), run_name=str(file))
             except Exception as error:
                 raise InputError(f"{file} raised {type(error).__name__}: {error}", "correct it") from error
         last = {"samples_seen": 0.0}

@@ -60,17 +60,25 @@ LOSSES: dict[str, Loss] = {}  # declared losses by name
 
 
 def loss(name: str) -> Callable[[Loss], Loss]:
-    """Declare a loss by its name in settings such as ``chamfer=1``; a ``DeclarationError`` if taken or no word."""
-    if name in LOSSES or name == NEURAL:
-        raise DeclarationError(f"the loss {name!r} is declared twice", "give one of them another name")
+    """Declare a loss by its name in settings such as ``chamfer=1``; a ``DeclarationError`` if taken or no word.
+
+    The same function, declared again as by a cell of a notebook, replaces its former self.
+    """
     if not is_word(name):
         raise DeclarationError(f"{name!r} cannot be the name of a loss", "use letters, digits and underscores")
 
     def declare(function: Loss) -> Loss:
+        if name == NEURAL or _place(LOSSES.get(name, function)) != _place(function):
+            raise DeclarationError(f"the loss {name!r} is declared twice", "give one of them another name")
         LOSSES[name] = function
         return function
 
     return declare
+
+
+def _place(function: Loss) -> tuple[str, str]:
+    """Module and qualified name of a function."""
+    return getattr(function, "__module__", ""), getattr(function, "__qualname__", repr(function))
 
 
 @loss("chamfer")

@@ -13,7 +13,8 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import losses
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.surface import sample_surface
-from shapeprog.language.tensors import Code
+from shapeprog.language.parser import parse
+from shapeprog.language.tensors import Code, encode
 from shapeprog.language.unroll import unroll
 from shapeprog.liang2022 import renderer
 from shapeprog.liang2022.renderer import Primitive
@@ -111,6 +112,12 @@ def test_samples_of_the_core_and_of_the_reference_have_the_same_means_and_gradie
 @pytest.mark.parametrize("ids", [[0, 0, 0], [0, 1, 0], [1, 0, 2], [1, 2, 0], [19, 19, 19], [20, 1, 0], [19, 21, 1]])
 def test_blocks_outside_the_grammar_draw_nothing(ids):
     assert renderer.unroll(torch.tensor([ids]), torch.full((1, 3, 7), 2.0)) == []
+
+
+def test_statements_that_are_not_of_the_paper_are_refused():
+    code = encode(parse("width, depth, height = 4, 4, 4\nseat()\n"))
+    with pytest.raises(ShapeProgError, match=r"is not one of the paper, whose last is 21\n.*statements='paper'"):
+        renderer.unroll(code.ids, code.parameters)
 
 
 def test_of_all_blocks_the_core_draws_those_of_the_reference_and_further_rotations():

@@ -51,8 +51,11 @@ def unroll(ids: Int[Tensor, "K J"], parameters: Float[Tensor, "K J 7"]) -> list[
     Rotation: copy i of n is turned by i/n of a circle about the vertical axis through its start, a cross arm by quarter
     turns.  Counts and quarter turns are rounded; negative extents draw nothing, nor do blocks outside the published
     grammar.  Of these, the language of this package draws rotations of other statements, and those inside or around
-    another loop.
+    another loop.  A ``ShapeProgError`` if a statement is none of the paper's.
     """
+    if ids.numel() and (largest := int(ids.max())) > END:
+        cure = "unroll it by sp.unroll, or infer a program of the paper: sp.infer(shape, statements='paper')"
+        raise ShapeProgError(f"statement {largest} is not one of the paper, whose last is {END}", cure)
     primitives: list[Primitive] = []
     for block, rows in zip(ids.tolist(), parameters, strict=True):
         *loops, statement = [number for number in block if 0 < number < END] or [0]

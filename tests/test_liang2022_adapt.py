@@ -247,6 +247,7 @@ def test_what_cannot_be_adapted_is_an_error_before_it_begins(room: Path, tmp_pat
     refuse(room, r"unknown loss 'chamfr'", loss="chamfr")
     tian2019 = str(room / "tian2019.safetensors")
     refuse(room, r"the design tian2019 has no offsets\n.*--learn all", learn="offsets", initial=tian2019)
+    refuse(room, r"an estimator samples ids.*\n.*leave --decoded-ids out", estimator="nvil", decoded_ids=1.0)
     refuse(room, "ids cannot learn", learn="offsets", estimator="rloo")
     scene = r"the losses coverage=1 are those of direct adaptation, and the method is {}\n.*--method direct"
     for method in ("guided", "hybrid"):
@@ -283,6 +284,11 @@ def test_settings_check_themselves(options: dict[str, Any], message: str):
 def test_settings_keep_paths_as_texts_and_lists_as_tuples():
     given: dict[str, Any] = {"train": [Path("few.npz"), "a"], "initial": Path("b"), "executor": Path("c")}
     assert AdaptSettings(**given) == AdaptSettings(train=("few.npz", "a"), initial="b", executor="c")
+
+
+def test_ids_learn_from_decoded_ones_unless_an_estimator_trains_them():
+    assert AdaptSettings(train=("few.npz",)).decoded_ids == 1
+    assert AdaptSettings(train=("few.npz",), estimator="rloo").decoded_ids == 0
 
 
 def test_a_stream_of_nothing_is_refused(room: Path):

@@ -176,7 +176,7 @@ class AdaptTask:
         """Losses that train ids: cross-entropy to the decoded ones, KL to the initial ones, or an estimator."""
         settings, losses = self._settings, {}
         log_prob = prediction.log_prob()
-        if settings.decoded_ids and settings.estimator == "none" and settings.learn == "all":
+        if settings.decoded_ids and settings.learn == "all":
             losses["decoded_ids"] = -settings.decoded_ids * log_prob.sum() / (STEPS * prediction.batch.live.sum())
         if self._initial is not None:
             with torch.no_grad():

@@ -45,7 +45,7 @@ class TrainingSettings:
         for name, value in asdict(self).items():
             if get_origin(hints[name]) is Literal and value not in get_args(hints[name]):
                 raise ShapeProgError(f"unknown {name} {value!r}", f"choose one of {', '.join(get_args(hints[name]))}")
-            if hints[name] in (int, float):
+            if hints[name] in (int, float, float | None):
                 least, most = name in AT_LEAST_ONE, 1 if name in SHARES else math.inf
                 check_number(name, value, least, most, whole=hints[name] is int)
             else:
@@ -129,7 +129,9 @@ class AdaptSettings(TrainingSettings):
     executor: str = option("executor", "Weights of the neural executor, for the loss neural.")
     learn: Literal["all", "offsets"] = option("all", "all weights, or offsets alone, which is not the paper's way.")
     decoder: Decoder = option("select", "Decoder: argmax, novel or select; with an estimator in validation alone.")  # noqa: RUF009
-    decoded_ids: float = option(1.0, "Weight of the cross-entropy to decoded ids (self-training); 0 with an estimator.")
+    decoded_ids: float | None = option(
+        None, "Weight of the cross-entropy to decoded ids (self-training) [1.0; 0.0 with an estimator]"
+    )
     kl: float = option(0.0, "Weight of the KL divergence of the ids from those of the initial weights.")
     rehearsal: int = option(8, "Synthetic shapes in every step, so that pretraining is not forgotten.")
     prior: Literal["narrow", "wide"] = option("wide", "Where these come from.")
@@ -137,7 +139,11 @@ class AdaptSettings(TrainingSettings):
     points: int = option(1000, "Points on each surface in one step.")
 
     def __post_init__(self) -> None:
+        if self.decoded_ids is None:
+            object.__setattr__(self, "decoded_ids", 1.0 if self.estimator == "none" else 0.0)
         super().__post_init__()
+        if self.decoded_ids and self.estimator != "none":
+            raise ShapeProgError("an estimator samples ids, so that none are decoded", "leave --decoded-ids out")
         if not self.train:
             raise ShapeProgError("there are no shapes to adapt to", "give a pack: --train bench_train.npz")
         if self.learn == "offsets" and self.estimator != "none":

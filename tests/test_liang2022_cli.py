@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,14 @@ def test_every_command_has_an_example(run: Run):
         assert shown.code == 0
         assert f"Example: shapeprog paper {name}" in shown.out
     assert "--learning-rate" in shown.out
+
+
+def test_help_names_the_options_of_the_paper(run: Run):
+    shown = {name: " ".join(run("paper", name, "--help").out.split()) for name in ("infer", "adapt")}
+    assert "Closest to the paper: --weights tian2019-narrow --decoder argmax." in shown["infer"]
+    words = re.search(r"Closest to the paper: (.*?)\.", shown["adapt"])
+    assert words
+    assert run("paper", "adapt", "runs", *words[1].split()).err.startswith("error: there are no shapes to adapt to")
 
 
 def test_infer_writes_programs(run: Run, here: Path):

@@ -39,6 +39,8 @@ def infer_command(
     """Write the program of each shape block by block with a generator.
 
     argmax is the network alone, novel the likeliest of 8 blocks that is new, select the best of 8 for the target.
+    The defaults are ours: the synthetic shapes of fast-wide include the test categories, and select reads the target.
+    Closest to the paper: --weights tian2019-narrow --decoder argmax.
 
     Example: shapeprog paper infer examples/bench_kenney.obj
     """
@@ -225,6 +227,9 @@ _add_training("train-executor", ExecutorSettings, "executor.ExecutorTask", """Tr
 
 _add_training("adapt", AdaptSettings, "adapt.AdaptTask", """Adapt a generator to real shapes.
 
-    All weights learn, through the renderer (direct: the paper), the neural executor (guided) or both (hybrid).
+    All weights learn, through the renderer (direct, the method of the paper), the neural executor (guided) or both
+    (hybrid). The other defaults are ours: the synthetic shapes of fast-wide include the test categories, select reads
+    the target, and self-training and rehearsal are added. Closest to the paper: --initial tian2019-narrow
+    --decoder argmax --decoded-ids 0 --rehearsal 0 --points 5000.
 
     Example: shapeprog paper adapt runs/bench --train bench_train.npz --val bench_val.npz""")  # fmt: skip

@@ -65,6 +65,7 @@ def decode(
 ) -> Decoded:  # fmt: skip
     """Decode a program of at most so many blocks K for each target, by a generator in evaluation mode.
 
+    The default decoder, ``select``, reads the target when it chooses blocks; that of the paper is ``argmax``.
     ``rng`` is the source of randomness for sampling, a fixed one by default.  Raises a ``ShapeProgError`` if there is
     no such decoder, the target has another shape, or the generator is in training mode.
     """

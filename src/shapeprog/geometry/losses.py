@@ -27,7 +27,7 @@ def chamfer(
 ) -> Values:
     """Chamfer distance: mean squared distance to the nearest neighbour, points to target plus target to points.
 
-    That of section 4.3.1, where "sum" is a mean by its numbers.
+    Section 4.3.1 says "sum", but only means fit its published values.
 
     Parameters
     ----------

@@ -53,7 +53,8 @@ class TrainingSettings:
                 several = get_origin(hints[name]) is tuple
                 texts = tuple(os.fspath(one) if isinstance(one, os.PathLike) else one for one in given)
                 if several == (given is not value) or not all(isinstance(one, str) for one in texts):
-                    raise ShapeProgError(f"{name} is {value!r}", f"give a {'tuple of texts' if several else 'text'}")
+                    wanted = "tuple of paths, such as ('x.npz',)" if several else "text"
+                    raise ShapeProgError(f"{name} is {value!r}", f"give a {wanted}")
                 object.__setattr__(self, name, texts if several else texts[0])
         if self.beta1 == 1:
             raise ShapeProgError("beta1 is 1", "give a number of 0 or more, below 1")
@@ -124,7 +125,7 @@ class AdaptSettings(TrainingSettings):
         "direct", "Adaptation by losses of the scene (direct), neural (guided) or both (hybrid)."
     )
     loss: str = option(
-        "", "Losses and weights, such as chamfer=1,soft_iou=3; must be of the method, whose they are by default."
+        "", "Losses and their weights, such as chamfer=1,soft_iou=3; they must suit --method, which sets the default."
     )
     executor: str = option("executor", "Weights of the neural executor, for the loss neural.")
     learn: Literal["all", "offsets"] = option("all", "all weights, or offsets alone, which is not the paper's way.")
@@ -134,7 +135,7 @@ class AdaptSettings(TrainingSettings):
     )
     kl: float = option(0.0, "Weight of the KL divergence of the ids from those of the initial weights.")
     rehearsal: int = option(8, "Synthetic shapes in every step, so that pretraining is not forgotten.")
-    prior: Literal["narrow", "wide"] = option("wide", "Where these come from.")
+    prior: Literal["narrow", "wide"] = option("wide", "Synthetic shapes to rehearse: narrow or wide.")
     estimator: Literal["none", "nvil", "rloo"] = option("none", "Gradient estimator of the ids: none, nvil or rloo.")
     points: int = option(1000, "Points on each surface in one step.")
 

@@ -42,7 +42,7 @@ def test_a_bad_file_between_two_good_ones_is_told_at_the_end_by_every_command(ru
     names(ended, bad.name)
     assert sorted(path.name for path in (tmp_path / "res").glob("*.json")) == ["a_good.json", "z_good.json"]
     ended = run("prepare", "in", "packs")
-    assert sum(int(count) for count in re.findall(r": (\d) shapes", ended.out)) == 2
+    assert sum(int(count) for count in re.findall(r": (\d) shapes?", ended.out)) == 2
     if within:
         names(ended, bad.name)
     if bad.exists():  # what is named and is not there is told before anything is measured

@@ -58,7 +58,7 @@ def prepare_command(
             raise terminal.Interrupted(f"finished categories are kept in {output}") from None
     assert last is not None
     for path, count in last.packs:
-        terminal.say(f"wrote {path}: {count} shapes")
+        terminal.say(f"wrote {path}: {_shapes(count)}")
     if small := ", ".join(path.name for path, count in last.packs if count < _FEW):
         terminal.note(f"Few shapes, so scores on them say little: {small}", "yellow")
     terminal.finish([terminal.at(path, error) for path, error in last.failures])
@@ -120,7 +120,7 @@ def write_samples(
         write_pack(pack, shapes_of(named, points, seed))
     files = [path for path in (out, folder, pack) if path is not None]
     for path in files:
-        terminal.say(f"wrote {path}: {len(programs)} shapes")
+        terminal.say(f"wrote {path}: {_shapes(len(programs))}")
     for name, program in named.items() if not files else ():
         terminal.output().print(f"# {name}")
         terminal.print_program(program)
@@ -217,13 +217,17 @@ def evaluate_command(
     terminal.finish(failures)
 
 
+def _shapes(count: int) -> str:
+    return f"{count} shape{'s' if count != 1 else ''}"
+
+
 def _table(summary: dict[str, Summary], shapes: int, seed: int) -> None:
     from rich import box
     from rich.table import Table
 
     console = terminal.output()
     names = [name for name in _LABELS if name in summary and summary[name].count]
-    table = Table(f"{shapes} shape{'s' if shapes != 1 else ''}, seed {seed}", box=box.SIMPLE_HEAD)
+    table = Table(f"{_shapes(shapes)}, seed {seed}", box=box.SIMPLE_HEAD)
     for heading in ("mean", "standard error", "median"):
         table.add_column(heading, justify="right")
     for name in names:

@@ -381,3 +381,13 @@ def test_long_lines_are_broken_and_nothing_is_lost():
             assert all(len(part.text) <= most for part in parts)
             assert "".join(part.text for part in parts).replace(" ", "") == line.text.replace(" ", "")
             assert [part.word for part in parts] == [line.word] + [""] * (len(parts) - 1)
+
+
+def test_a_name_that_is_longer_than_the_picture_is_wide_is_broken_as_well(tmp_path: Path):
+    name = "f" * 150
+    program = parse(f"width, depth, height = 10, 10, 10\ndef {name}(a):\n    box(height=a)\n{name}(a=2)\n")
+    for line in listing(program):
+        parts = wrapped(line, 40)
+        assert "".join(part.text for part in parts).replace(" ", "") == line.text.replace(" ", "")
+        assert ["".join(parted(part)) for part in parts] == [part.text for part in parts]
+    picture(None, program, tmp_path / "a.png")

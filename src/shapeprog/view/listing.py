@@ -92,12 +92,13 @@ def parted(line: Row) -> tuple[str, str, str]:
 
 
 def wrapped(line: Row, length: int) -> list[Row]:
-    """A line as several of at most ``length`` letters, broken between words; later lines have no word and are
-    indented."""
+    """A line as several of at most ``length`` letters, broken between words, or within one that is longer; later lines
+    have no word and are indented, nor does the first where it was broken within its word."""
     indent = " " * (len(line.text) - len(line.text.lstrip(" ")) + 4)
     width = max(length, len(indent) + 2)
     first, *others = textwrap.wrap(line.text, width, subsequent_indent=indent, break_on_hyphens=False) or [""]
-    return [replace(line, text=first), *(replace(line, text=text, word="") for text in others)]
+    word = line.word if line.word in first else ""
+    return [replace(line, text=first, word=word), *(replace(line, text=text, word="") for text in others)]
 
 
 def _word(line: Line) -> str:

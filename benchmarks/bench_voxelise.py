@@ -16,6 +16,7 @@ import numpy as np
 import trimesh
 
 from shapeprog.data.sampling import sample_surface
+from shapeprog.geometry.mesh import joined
 from shapeprog.geometry.voxelise import SHRINK, voxelise_mesh
 
 CENTRES = np.stack(np.meshgrid(*[np.arange(32) - 15.5] * 3, indexing="ij"), -1)
@@ -50,9 +51,7 @@ def solids(rng):
 
 
 def union(parts):
-    starts = np.cumsum([0] + [len(vertices) for vertices, _, _ in parts])
-    faces = [faces + start for (_, faces, _), start in zip(parts, starts, strict=False)]
-    return np.concatenate([vertices for vertices, _, _ in parts]), np.concatenate(faces)
+    return joined([(vertices, faces) for vertices, faces, _ in parts])
 
 
 def truth(parts, vertices, faces):

@@ -29,10 +29,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.planted import solid_overlaps
+from benchmarks.planted import in_frame, solid_overlaps
 from benchmarks.rows import measure_all, read_rows
 from benchmarks.structure import Task as Object
-from benchmarks.structure import given, objects
+from benchmarks.structure import given, objects, whole
 
 METHODS = ("plain", "recognised", "moved")
 
@@ -136,10 +136,7 @@ def measure(task: Task) -> dict[str, Any]:
         program = with_library(program, library)
     seconds = time.process_time() - cpu
     placed = [Triangles(shape.frame.to_grid(vertices), faces) for vertices, faces in parts]
-    vertices = np.concatenate([each.vertices for each in placed])
-    starts = np.cumsum([0, *(len(each.vertices) for each in placed)])
-    faces = np.concatenate([each.faces + first for each, first in zip(placed, starts, strict=False)])
-    target = replace(shape, points=None, vertices=vertices, faces=faces)
+    target = replace(shape, points=None, **whole(placed))
     row = evaluate_program(program, target, seed=task.seed, looks=True)
     there = [each for each in called(parse(text)) if each[0]] if own else []
     found = sum(_found(each, called(program), shape.frame) for each in there)
@@ -156,10 +153,9 @@ def _apart(text: str) -> tuple[list[Any], Any]:
     from shapeprog.formats.parts import parts
     from shapeprog.language.parser import parse
 
-    drawn = [(part.vertices, part.faces) for part in parts(parse(text))]
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in drawn)])
-    faces = np.concatenate([each + first for (_, each), first in zip(drawn, starts, strict=False)])
-    return drawn, shape_from_mesh(np.concatenate([each for each, _ in drawn]), faces, name="planted", axes=np.eye(3))
+    drawn = parts(parse(text))
+    shape = shape_from_mesh(**whole(drawn), name="planted", axes=np.eye(3))
+    return [(part.vertices, part.faces) for part in drawn], shape
 
 
 def called(program: Any) -> list[tuple[str, Any]]:
@@ -190,12 +186,8 @@ def called(program: Any) -> list[tuple[str, Any]]:
 
 def _found(planted: tuple[str, Any], parts: list[tuple[str, Any]], frame: Any) -> bool:
     """Whether a planted call is among the parts of a program in the frame of the grid."""
-    import torch
-
     name, scene = planted
-    centre = torch.from_numpy(frame.to_grid(scene.centre.numpy())).to(scene.centre)
-    scene = replace(scene, size=scene.size / frame.scale, centre=centre)
-    overlaps = (solid_overlaps(scene, other) for word, other in parts if word == name)
+    overlaps = (solid_overlaps(in_frame(scene, frame), other) for word, other in parts if word == name)
     return any((each.max(1) >= 0.5).all() for each in overlaps)
 
 

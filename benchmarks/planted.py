@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.rows import measure_all, read_rows
-from benchmarks.structure import fused
+from benchmarks.structure import fused, whole
 
 SETS = ("furniture", "cones", "hinted_cones")
 KINDS = ("parts", "fused", "cells")
@@ -84,19 +84,16 @@ def measure(task: Task) -> dict[str, Any]:
         declare(hinted=task.set == "hinted_cones")
         planted = parse(cone_table(np.random.default_rng((task.seed, task.number))))
     drawn = parts(planted)
-    counts = np.cumsum([0, *(len(part.vertices) for part in drawn)])
-    whole = np.concatenate([part.vertices for part in drawn])
-    faces = np.concatenate([part.faces + first for part, first in zip(drawn, counts, strict=False)])
-    given = (whole, faces) if task.kind == "parts" else fused(whole, faces)
+    mesh = whole(drawn)
+    given = mesh.values() if task.kind == "parts" else fused(**mesh)
     shape = shape_from_mesh(*given, name=str(task.number), axes=np.eye(3), seed=task.seed)
     if task.kind == "cells":
         shape = replace(shape, points=None, vertices=None, faces=None)
     started = time.process_time()
     found = infer(shape, seed=task.seed).program
     seconds = time.process_time() - started
-    scene, drawing, frame = unroll(found), unroll(planted), shape.frame
-    centre = torch.from_numpy(frame.to_grid(drawing.centre.numpy())).to(drawing.centre)
-    drawing = replace(drawing, size=drawing.size / frame.scale, centre=centre)
+    scene, frame = unroll(found), shape.frame
+    drawing = in_frame(unroll(planted), frame)
     placed = [Triangles(frame.to_grid(part.vertices), part.faces) for part in drawn]
     ceiling = part_scores(placed, drawing)
     return vars(task) | part_scores(placed, scene)._asdict() | {
@@ -108,6 +105,14 @@ def measure(task: Task) -> dict[str, Any]:
         "numbers": sum(map(numbers_written, found.walk())),
         "seconds": seconds, "text": format_program(found),
     }  # fmt: skip
+
+
+def in_frame(scene: Any, frame: Any) -> Any:
+    """A scene of the world in the grid of a frame with the axes of the world."""
+    import torch
+
+    centre = torch.from_numpy(frame.to_grid(scene.centre.numpy())).to(scene.centre)
+    return replace(scene, size=scene.size / frame.scale, centre=centre)
 
 
 def solid_scores(planted: Any, drawing: Any, found: Any, scene: Any) -> dict[str, float]:
@@ -144,15 +149,8 @@ def solid_overlaps(planted: Any, found: Any) -> Any:
     from shapeprog.geometry.distance import each_distance
     from shapeprog.geometry.primitives import primitives
 
-    def volumes(scene: Any) -> Any:
-        volume = torch.zeros(len(scene.mask), dtype=torch.float64)
-        for kind in scene.kinds:
-            of_kind = scene.mask & (scene.kind == kind)
-            volume[of_kind] = primitives[kind].volume(scene.size[of_kind].double())
-        return volume[scene.mask].numpy()
-
     drawn = np.random.default_rng(0).uniform(-1, 1, (POINTS, 3))
-    own, other = volumes(planted), volumes(found)
+    own, other = (replace(each, size=each.size.double()).volumes[each.mask].numpy() for each in (planted, found))
     table = np.zeros((len(own), len(other)))
     for row, slot in enumerate(planted.mask.nonzero()[:, 0].tolist()):
         half = primitives[int(planted.kind[slot])].bound(planted.size[slot])

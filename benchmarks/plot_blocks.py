@@ -1,19 +1,20 @@
 """Plot IoU against the number of blocks allowed, search and greedy boxes, from rows of ``reconstruction.py``.
 
-    python benchmarks/reconstruction.py --packs chair.npz table.npz --shapes 12 --blocks 1 2 3 4 5 6 8 10 \\
+    python -m benchmarks.reconstruction --packs chair.npz table.npz --shapes 12 --blocks 1 2 3 4 5 6 8 10 \\
         --methods "greedy boxes" search --out blocks.jsonl
-    python benchmarks/plot_blocks.py blocks.jsonl docs/iou_against_blocks.png
+    python -m benchmarks.plot_blocks blocks.jsonl docs/iou_against_blocks.png
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from collections import defaultdict
 from pathlib import Path
 
 import matplotlib
 import numpy as np
+
+from benchmarks.rows import read_rows
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -24,8 +25,7 @@ STYLES = {"search": ("-o", "#1f4e79"), "greedy boxes": ("--s", "#b0413e")}
 def main(rows_path: str, picture: str) -> None:
     """One panel for each category: mean IoU with its standard error against the most blocks allowed."""
     groups: dict[tuple[str, str], dict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for line in Path(rows_path).read_text().splitlines():
-        row = json.loads(line)
+    for row in read_rows(Path(rows_path)):
         groups[row["pack"], row["method"]][row["allowed"]].append(row["iou"])
     packs = sorted({pack for pack, _ in groups})
     figure, axes = plt.subplots(1, len(packs), figsize=(2.6 * len(packs), 2.6), sharey=True, layout="constrained")

@@ -1,8 +1,8 @@
 """Reconstruction on packs of shapes: search and its baselines, the same shapes in the same run.
 
-    python benchmarks/reconstruction.py --packs bench_test.npz cabinet_test.npz --out results/shapenet.jsonl
-    python benchmarks/reconstruction.py --packs chair.npz table.npz --split test --out results/modelnet.jsonl
-    python benchmarks/reconstruction.py --table results/shapenet.jsonl
+    python -m benchmarks.reconstruction --packs bench_test.npz cabinet_test.npz --out results/shapenet.jsonl
+    python -m benchmarks.reconstruction --packs chair.npz table.npz --split test --out results/modelnet.jsonl
+    python -m benchmarks.reconstruction --table results/shapenet.jsonl
 
 One line of JSON is kept for every shape, method and number of blocks; a run that was stopped goes on where it was.
 Packs with points give the methods ``search`` (mesh points given) and ``search, voxels alone``; packs without give
@@ -14,9 +14,7 @@ to work with is left out.  There is no time budget: the seed alone decides.
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import multiprocessing
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -25,6 +23,8 @@ from typing import Any
 
 import numpy as np
 import torch
+
+from benchmarks.rows import measure_all, read_rows
 
 Task = tuple[str, int, int, tuple[str, ...], int]
 """Pack, index, most blocks, methods, seed."""
@@ -96,26 +96,15 @@ def tasks(args: argparse.Namespace, done: set[tuple[str, str, int]]) -> Iterator
 def run(args: argparse.Namespace) -> None:
     """Measure what is not in the output yet, shape after shape, in several processes."""
     out = Path(args.out)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    known = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
-    done = {(row["pack"], row["name"], row["allowed"]) for row in known}
-    todo = list(tasks(args, done))
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(args.workers) as pool, out.open("a") as file:
-        for number, rows in enumerate(pool.imap_unordered(measure, todo), 1):
-            file.writelines(json.dumps(row) + "\n" for row in rows)
-            file.flush()
-            print(f"\r{number}/{len(todo)}", end="", flush=True)
-    print()
+    done = {(row["pack"], row["name"], row["allowed"]) for row in read_rows(out)}
+    measure_all(out, list(tasks(args, done)), measure, args.workers)
 
 
 def table(paths: list[str]) -> str:
     """Markdown: mean, its standard error and the median of every measure, for each pack, method and size."""
     groups: dict[tuple[str, int, str], list[dict[str, Any]]] = {}
-    for path in paths:
-        for line in Path(path).read_text().splitlines():
-            row = json.loads(line)
-            groups.setdefault((row["pack"], row["allowed"], row["method"]), []).append(row)
+    for row in [row for path in paths for row in read_rows(Path(path))]:
+        groups.setdefault((row["pack"], row["allowed"], row["method"]), []).append(row)
     lines = ["| pack | shapes | method | " + " | ".join(COLUMNS) + " |", "|" + "---|" * (len(COLUMNS) + 3)]
     for (pack, allowed, method), rows in sorted(groups.items()):
         cells = [f"{pack}, <= {allowed}", str(len(rows)), method]

@@ -132,7 +132,7 @@ def measure(task: Task) -> dict[str, Any]:
     return asdict(row) | {
         "set": task.set, "seconds": seconds, "cpu_seconds": cpu_seconds, "allowed": task.blocks, "seed": task.seed,
         "method": task.method, "price": task.price, "lines": len(text.splitlines()), "program": text,
-        "object_in_one_piece": joined(target.vertices, target.faces),
+        "object_in_one_piece": in_one_piece(target.vertices, target.faces),
         "in_cells": format_program(Program(program.body)),  # the text does not tell where its whole is in the grid
         **{f"edited_{name}": share for name, share in edited.items()},
     }  # fmt: skip
@@ -177,9 +177,9 @@ def given(task: Task) -> tuple[list[Any], Any]:
 
 def whole(parts: Sequence[Any]) -> dict[str, Any]:
     """The vertices and faces of all parts as one mesh."""
-    counts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = [part.faces + first for part, first in zip(parts, counts, strict=False)]
-    return {"vertices": np.concatenate([part.vertices for part in parts]), "faces": np.concatenate(faces)}
+    from shapeprog.geometry.mesh import joined
+
+    return dict(zip(("vertices", "faces"), joined([(part.vertices, part.faces) for part in parts]), strict=True))
 
 
 def scanned(points: Any, task: Task) -> Any:
@@ -206,7 +206,7 @@ def fused(vertices: Any, faces: Any) -> tuple[Any, Any]:
     return (corners + 0.5 - CELLS / 2 - MARGIN) / scale + middle, triangles.astype(np.int64)
 
 
-def joined(vertices: Any, faces: Any) -> bool:
+def in_one_piece(vertices: Any, faces: Any) -> bool:
     """Whether a mesh in the grid frame is one piece, but for gaps that are narrower than 1 % of its longest side."""
     from scipy.ndimage import label
 

@@ -42,7 +42,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import null_space
 
+from benchmarks.planted import in_frame
 from benchmarks.rows import measure_all, read_rows
+from benchmarks.structure import whole
 
 SETS = ("fitted", "alone", "rows", "inferred", "small", "chairs")
 
@@ -320,8 +322,6 @@ def kinds_tied(program: Any) -> tuple[int, int]:
 
 def of_group(task: Task) -> dict[str, Any]:
     """Whether equal parts that were planted are one statement with the right count, and planted boxes are written."""
-    import torch
-
     from shapeprog.data.placement import shape_from_mesh
     from shapeprog.formats.parts import parts
     from shapeprog.inference import infer
@@ -342,15 +342,9 @@ def of_group(task: Task) -> dict[str, Any]:
         noisy = with_noise(planted, np.random.default_rng((task.seed, task.number, 1)))
         found = tie(noisy, evidence_of_program(planted, task.seed), seed=task.seed)
     else:
-        each = parts(planted)
-        first = np.cumsum([0, *(len(part.vertices) for part in each)])
-        faces = np.concatenate([part.faces + start for part, start in zip(each, first, strict=False)])
-        shape = shape_from_mesh(np.concatenate([part.vertices for part in each]), faces, name="", axes=np.eye(3))
+        shape = shape_from_mesh(**whole(parts(planted)), name="", axes=np.eye(3))
         found = infer(shape, seed=task.seed).program
-        scale = shape.frame.scale
-        scene = replace(
-            scene, size=scene.size / scale, centre=torch.from_numpy(shape.frame.to_grid(scene.centre.numpy()))
-        )
+        scene = in_frame(scene, shape.frame)
     seconds = time.process_time() - started
     (here, labels), (there, wanted) = sides(unroll(found)), sides(scene)
     equal = np.isin(wanted[:, 1], [block for block, node in enumerate(planted.draws) if node.role == role])

@@ -19,6 +19,7 @@ from scipy.optimize import minimize
 from shapeprog.data.packs import read_pack
 from shapeprog.data.parts import part_files, read_parts
 from shapeprog.data.uprightness import WEIGHTS, find_up, measures
+from shapeprog.geometry.mesh import joined
 from shapeprog.geometry.voxelise import voxelise_mesh
 from shapeprog.space import Array, Frame, axis_name
 
@@ -67,20 +68,12 @@ def validation(data: Path) -> Iterator[tuple[str, Array, Array]]:
     """Sets, vertices and faces of meshes that are +y up."""
     for name in ("bench", "cabinet"):
         for file in sorted((data / "shapenet_meshes" / f"{name}_val").glob("*.ply")):
-            yield name, *joined([file])
+            yield name, *joined(read_parts([file]))
     known = part_files(data / "ikea_parts")
     for name in list(known)[::2]:
-        yield "ikea", *joined(known[name])
+        yield "ikea", *joined(read_parts(known[name]))
     for file in sorted((data / "cc0_furniture").glob("*/*.obj")):
-        yield "cc0", *joined([file])
-
-
-def joined(files: list[Path]) -> tuple[Array, Array]:
-    """Several meshes as one."""
-    parts = read_parts(files)
-    first = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
-    faces = np.concatenate([faces + at for (_, faces), at in zip(parts, first, strict=False)])
-    return np.concatenate([vertices for vertices, _ in parts]), faces
+        yield "cc0", *joined(read_parts([file]))
 
 
 def measure(data: Path) -> None:

@@ -26,6 +26,7 @@ from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, OutputError, ProgramError, ShapeProgError
 from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
 from shapeprog.formats.colours import colour
+from shapeprog.formats.files import program_files
 from shapeprog.formats.frames import frame_comment, frame_of_grid, in_grid_of, placement, scale_of
 from shapeprog.formats.json_form import program_to_json, result_from_json
 from shapeprog.formats.parts import crease_normals, parts, solid
@@ -178,6 +179,12 @@ def test_every_program_file_reads_back_with_its_frame(tmp_path: Path):
     text = tmp_path / "table.txt"
     text.write_text(TEXT)
     assert sp.load(text) == PROGRAM
+
+
+def test_the_programs_of_a_folder_are_found_in_any_case_and_the_json_of_a_name_stands_for_it(tmp_path: Path):
+    for name in ("b.shape", "b.JSON", "A.SHAPE", "c.json", "d.glb"):
+        (tmp_path / name).touch()
+    assert [path.name for path in program_files(tmp_path)] == ["A.SHAPE", "b.JSON", "c.json"]
 
 
 def test_files_that_hold_no_program_are_refused_in_words(tmp_path: Path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,8 +49,9 @@ def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str,
     Of a cloud as many ``points`` are kept as are drawn on other surfaces.
     """
     files = [path] if path.suffix.lower() in suffixes("program") else []
-    if path.is_dir() and any(any(path.glob(f"*{suffix}")) for suffix in suffixes("program")):
-        files = program_files(path)
+    if path.is_dir():
+        with suppress(InputError):  # a folder of shapes
+            files = program_files(path)
     for file in files:
         try:
             with in_words(file, "a program"):

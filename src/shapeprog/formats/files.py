@@ -40,7 +40,7 @@ def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None
     if file_format is None or not file_format.reader:
         endings = " or ".join(program_suffixes())
         if file.is_dir():
-            held = sorted(entry.name for entry in file.iterdir() if entry.suffix.lower() in program_suffixes())
+            held = sorted(entry.name for entry in file.glob("*") if entry.suffix.lower() in program_suffixes())
             cure = f"name one of its programs, such as {file / held[0]}" if held else f"programs are {endings} files"
             raise InputError(f"{file} is a folder", cure)
         ending = f"its name ends in {file.suffix!r}" if file.suffix else "its name has no suffix"
@@ -60,8 +60,8 @@ def program_files(folder: Path) -> list[Path]:
     cure = f"give a folder that holds {' or '.join(suffixes('program'))} files"
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}", cure)
-    json_last = sorted(suffixes("program"), key=".json".__eq__)
-    result = {path.with_suffix(""): path for suffix in json_last for path in folder.glob(f"*{suffix}")}
+    files = [file for file in folder.glob("*") if file.suffix.lower() in suffixes("program")]
+    result = {file.with_suffix(""): file for file in sorted(files, key=lambda file: file.suffix.lower() == ".json")}
     if not result:
         raise InputError(f"the folder {folder} holds no programs", cure)
     return [result[key] for key in sorted(result)]

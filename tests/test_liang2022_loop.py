@@ -96,9 +96,10 @@ def test_a_damaged_state_or_log_is_named(tmp_path: Path):
     with pytest.raises(InputError, match=r"state\.pt is damaged, or of another network\n.*--restart"):
         run(tmp_path)
     (tmp_path / STATE).write_bytes(good)
-    (tmp_path / LOG).write_text("{\n")
-    with pytest.raises(InputError, match=r"the log .* is damaged"):
-        run(tmp_path)
+    for damaged in (b"{\n", b"\xff\n"):
+        (tmp_path / LOG).write_bytes(damaged)
+        with pytest.raises(InputError, match=r"the log .* is damaged"):
+            run(tmp_path)
 
 
 def test_a_state_of_another_network_is_refused(tmp_path: Path):

@@ -162,9 +162,9 @@ def train(
 
 def read_log(path: Path) -> list[Any]:
     """Records of a file, one a line, none if it is missing; a last line that was cut short is left out."""
-    lines = path.read_text().splitlines(keepends=True) if path.exists() else []
+    lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
     try:
-        return [json.loads(line) for line in lines if line.endswith("\n")]
+        return [json.loads(line) for line in lines if line.endswith(b"\n")]
     except ValueError as error:
         raise InputError(f"the log {path} is damaged", "move it away, or start over with --restart") from error
 
@@ -212,8 +212,9 @@ def _prefetch(make: Callable[[int], Any], indices: Iterable[int]) -> Iterator[An
 def _resume(path: Path, settings: TrainingSettings, module: nn.Module, optimiser: AdamW) -> tuple[int, float]:
     """Load the state of a run, by torch's reader that runs no code; its step and best score."""
     try:
-        if zipfile.ZipFile(path).testzip():  # torch does not compare the checksums
-            raise ValueError
+        with zipfile.ZipFile(path) as archive:
+            if archive.testzip():  # torch does not compare the checksums
+                raise ValueError
         state = torch.load(path, map_location="cpu", weights_only=True)
         settings.check_resumable(state["settings"], str(path.parent))
         module.load_state_dict(state["module"])

@@ -42,7 +42,6 @@ from shapeprog.formats.samples import occupied
 from shapeprog.geometry import cells
 from shapeprog.geometry.mesh import union_mesh
 from shapeprog.geometry.nearest import squared_distance
-from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.surface import sample_surface
 from shapeprog.language.free import numbers
 from shapeprog.language.program import Program
@@ -157,7 +156,10 @@ def evaluate_program(
         iou = 0.0
         with suppress(ShapeProgError):  # parts too far away, or too many, to have cells
             iou = float(cells.iou(occupied(program, scene, snapped), cells.pack(target.voxels)))
-    to_target, from_target, f1, floor = _distances(scene, target, points, seed)
+    sampled = None
+    with suppress(ShapeProgError):  # no primitive has a surface
+        sampled = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
+    to_target, from_target, f1, floor = distances(sampled, target, points, seed)
     row = Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,
         noise_floor=floor, f1=f1, iou=iou, blocks=program.blocks, statements=program.statements,
@@ -262,38 +264,24 @@ def target_samples(target: Shape, points: int, seed: int) -> tuple[Cloud, Cloud]
     return torch.from_numpy(first), torch.from_numpy(second)
 
 
-def _distances(scene: Scene, target: Shape, points: int, seed: int) -> tuple[float, float, float, float]:
-    """Prediction to target, target to prediction, F1, and noise floor."""
+def distances(sampled: Cloud | None, target: Shape, points: int, seed: int) -> tuple[float, float, float, float]:
+    """Prediction to target, target to prediction, F1, and noise floor; not a number for a target of cells alone.
+
+    ``sampled`` are points on the surface of the prediction, ``None`` if it has no surface.
+    """
     samples = target_samples(target, points, seed)
     if samples is None:
-        return float("nan"), float("nan"), float("nan"), float("nan")
+        return math.nan, math.nan, math.nan, math.nan
     square = world_scale(target) ** 2
-    floor = noise_floor(samples, square)
-    surface = target_surface(target, samples, points)
-    try:
-        sampled = sample_surface(scene, points, torch.Generator().manual_seed(seed)).points.double()
-    except ShapeProgError:  # no primitive has a surface
-        return float("inf"), float("inf"), 0.0, floor
-    return *cloud_distances(sampled, surface, square), floor
-
-
-def noise_floor(samples: tuple[Cloud, Cloud], square: float) -> float:
-    """The Chamfer distance between two samplings of one surface; ``square`` is the area of a cell in the world."""
-    return float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
-
-
-def cloud_distances(sampled: Cloud, surface: Float[Tensor, "Q 3"], square: float) -> tuple[float, float, float]:
-    """Prediction to target, target to prediction, and F1, of points on both; ``square`` is the area of a cell."""
+    floor = float(squared_distance(*samples).mean() + squared_distance(*reversed(samples)).mean()) * square
+    if sampled is None:
+        return math.inf, math.inf, 0.0, floor
+    surface = samples[0]
+    if _mesh(target) is None:  # all points of a cloud, undivided
+        assert target.points is not None
+        mixed = np.random.default_rng(0).permutation(len(target.points))[:points]  # files list them place after place
+        surface = torch.from_numpy(np.asarray(target.points[np.sort(mixed)], np.float64))
     to_target, from_target = squared_distance(sampled, surface), squared_distance(surface, sampled)
     precision, recall = float((to_target <= CELL**2).double().mean()), float((from_target <= CELL**2).double().mean())
     f1 = 2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0
-    return float(to_target.mean()) * square, float(from_target.mean()) * square, f1
-
-
-def target_surface(target: Shape, samples: tuple[Cloud, Cloud], points: int) -> Cloud:
-    """The points that predictions are compared with: the first sampling of a mesh, or those of a cloud, undivided."""
-    if _mesh(target) is not None:
-        return samples[0]
-    assert target.points is not None
-    mixed = np.random.default_rng(0).permutation(len(target.points))[:points]  # files list them place after place
-    return torch.from_numpy(np.asarray(target.points[np.sort(mixed)], np.float64))
+    return float(to_target.mean()) * square, float(from_target.mean()) * square, f1, floor

@@ -19,16 +19,7 @@ from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.evaluation.likeness import Triangles
-from shapeprog.evaluation.metrics import (
-    Metrics,
-    cloud_distances,
-    evaluate_program,
-    noise_floor,
-    target_samples,
-    target_surface,
-    with_likeness,
-    world_scale,
-)
+from shapeprog.evaluation.metrics import Metrics, distances, evaluate_program, with_likeness
 from shapeprog.evaluation.parts import part_scores
 from shapeprog.formats.files import load_with_frame, program_files
 from shapeprog.formats.format import suffixes
@@ -130,11 +121,9 @@ def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> 
         cells = voxelise_points(sampled)
     union = int((cells | target.voxels).sum())
     iou = float((cells & target.voxels).sum() / union) if union else 1.0
-    samples, square = target_samples(target, points, seed), world_scale(target) ** 2
     forward = backward = floor = f1 = math.nan
-    if samples is not None and sampled is not None and len(sampled):
+    if sampled is not None and len(sampled):
         cloud = torch.from_numpy(np.asarray(sampled, np.float64))
-        forward, backward, f1 = cloud_distances(cloud, target_surface(target, samples, points), square)
-        floor = noise_floor(samples, square)
+        forward, backward, f1, floor = distances(cloud, target, points, seed)
     row = Metrics(target.name, forward + backward, forward, backward, floor, f1, iou, 0, 0, 0)
     return row if mesh is None else with_likeness(row, mesh, target, seed)

@@ -49,7 +49,7 @@ def tidy_command(
     terminal.check_free([out] if out else [], overwrite, program)
     if not given.size:
         raise InputError(f"{program} draws nothing", "give a program with at least one drawing statement")
-    lines = [] if given.source is None or not given.source.placed else [*given.source.walk()]
+    lines = [] if given.source is None else [*given.source.walk()]
     if any(isinstance(line, Function) or getattr(line, "kind", "") in ("inside", "divide") for line in lines):
         cure = "tidy is for programs of plain numbers; edit this one by hand"
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)

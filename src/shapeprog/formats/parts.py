@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapeprog.errors import OutputError, ShapeProgError
+from shapeprog.geometry.contacts import linked
 from shapeprog.geometry.mesh import joined, part_meshes, triangle_normals, union_mesh
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.program import Program
@@ -117,14 +118,10 @@ def crease_normals(vertices: Vertices, faces: Faces, angle: float = 40.0) -> Ver
     The normal of a corner is the area-weighted mean over the triangles at its vertex that belong to the same smooth
     surface: those that are connected by edges with less than ``angle`` degrees between the normals on both sides.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     area, flat = triangle_normals(vertices, faces)
     pairs = _shared_edges(faces) // 3
     pairs = pairs[:, (flat[pairs[0]] * flat[pairs[1]]).sum(1) > np.cos(np.radians(angle))]
-    links = coo_array((np.ones(pairs.shape[1]), pairs), (len(faces), len(faces)))
-    _, surface = connected_components(links, directed=False)
+    surface = linked(pairs.T, len(faces))
     _, corner = np.unique(faces * len(faces) + surface[:, None], return_inverse=True)
     corner = corner.reshape(-1)
     total = np.stack([np.bincount(corner, np.repeat(area[:, axis], 3)) for axis in range(3)], 1)[corner]

@@ -94,7 +94,7 @@ def script(program: Program, frame: Frame, reserved: Collection[str], inner: str
     """
     program = placed_if_possible(program)
     source = program.source
-    if source is None or not source.placed:
+    if source is None:
         meshes = tuple(parts(program, frame))
         return Script("", (), {}, (), np.eye(4), _colours({mesh.word for mesh in meshes}), meshes)
     assert source.unit is not None

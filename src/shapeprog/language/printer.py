@@ -23,6 +23,7 @@ from shapeprog.language.ast import (
     Part,
     Point,
     Source,
+    note_of,
 )
 from shapeprog.language.expression import Value, text_of
 from shapeprog.language.placement import ROUND_ROLES
@@ -94,7 +95,7 @@ def _lines(lines: Iterable[Line], depth: int, loops: int) -> Iterator[tuple[str,
             yield f"{indent}# {_remark(line.text)}" if line.text else "", line
             continue
         empty = False
-        note = f"  # {_remark(line.note)}" if not isinstance(line, Draw | Loop) and line.note else ""
+        note = f"  # {_remark(text)}" if (text := note_of(line)) else ""
         match line:
             case Draw():
                 role, call = checked_role(line), _call(line)

@@ -28,7 +28,6 @@ from shapeprog.errors import InputError
 from shapeprog.formats.format import CELLS, GRID, Y_UP, Z_UP, Format
 from shapeprog.language.ast import Scale
 from shapeprog.language.evaluate import evaluated
-from shapeprog.language.placement import LONGEST_SIDE
 from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.text import Text
@@ -52,7 +51,7 @@ _ROUNDED = 1e-7  # share of the longest side by which the origin of a text is ro
 _GRID = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """Directions x, y, z of a text in the axes of the grid, as columns."""
 
-UP = {"x": GRID, "y": Y_UP, "z": Z_UP}  # up and front axes of a file by the axis that points up
+BY_UP = {"x": GRID, "y": Y_UP, "z": Z_UP}  # up and front axes of a file by the axis that points up
 
 
 class Placement(NamedTuple):
@@ -103,7 +102,7 @@ def placement(
         if unit:
             raise InputError(f"--unit has no effect on {chosen.suffixes[0]}", "its lengths are in cells")
         return Placement(Frame())
-    if up and up.removeprefix("+") not in UP:
+    if up and up.removeprefix("+") not in BY_UP:
         raise InputError(f"{up!r} is no axis that points up", "use x, y or z")
     if up and on_input:
         raise InputError("--on-input takes the axes of the input, --up another one", "give one of them")
@@ -117,7 +116,7 @@ def placement(
             return Placement(frame)
         centre = per_cell / frame.scale * np.array(frame.centre)
         return Placement(Frame.of(per_cell, centre, np.array(frame.axes)), name)
-    matrix = grid_axes(*(UP[up.removeprefix("+")] if up else chosen.axes))
+    matrix = grid_axes(*(BY_UP[up.removeprefix("+")] if up else chosen.axes))
     centre = -per_cell * (matrix @ _ground(program, chosen.rests)) + 0.0 if chosen.maker else np.zeros(3)
     return Placement(Frame.of(per_cell, centre, matrix), name)
 
@@ -231,7 +230,7 @@ def frame_comment(frame: Frame | None, program: Program) -> str:
     for name, factor in factors.items():
         if math.isclose(factor, text.scale, rel_tol=2e-7):
             size = f"{factor:.8g} {name}".rstrip()
-    step = _ROUNDED * text.scale * LONGEST_SIDE / scale.cells_per_unit
+    step = _ROUNDED * text.scale * SPAN / scale.cells_per_unit
     digits = -math.ceil(math.log10(max(step, 1e-300)))
     origin = " ".join(f"{round(value, digits) + 0.0:.15g}" for value in text.centre)
     axes = np.asarray(text.axes)

@@ -29,9 +29,9 @@ from shapeprog.language.ast import (
 from shapeprog.language.convert import placed_if_possible
 from shapeprog.language.expression import Name, value_at
 from shapeprog.language.named import Named, names
-from shapeprog.language.placement import LONGEST_SIDE, SIZES
+from shapeprog.language.placement import SIZES
 from shapeprog.language.program import Program
-from shapeprog.space import FloatArray, Frame
+from shapeprog.space import SPAN, FloatArray, Frame
 
 _DEFINED = re.compile(r"^(?:module|function|def|class) (\w+)", re.MULTILINE)
 _CALLED = re.compile(r"(?:@(?=\w+$)|\b(?=\w+\s*\())(\w+)", re.MULTILINE)
@@ -117,7 +117,7 @@ def world_of(source: Source, frame: Frame) -> FloatArray:
     world = frame.matrix() @ np.array([[0, 0, k, scale.floor], [0, k, 0, scale.middle], [-k, 0, 0, 0], [0, 0, 0, 1]])
     size = float(np.linalg.norm(world[:3, 0]))
     world[:3, :3] = np.round(world[:3, :3] / size, 9) * float(f"{size:.7g}")
-    world[:3, 3] = np.where(np.abs(world[:3, 3]) < 1e-6 * size * LONGEST_SIDE / k, 0, world[:3, 3])
+    world[:3, 3] = np.where(np.abs(world[:3, 3]) < 1e-6 * size * SPAN / k, 0, world[:3, 3])
     return world + 0.0
 
 

@@ -30,10 +30,11 @@ from shapeprog.language.ast import (
 )
 from shapeprog.language.expression import value_at
 from shapeprog.language.lowering import Context, Drawn, Lowering, Placed, Scope, sizes_of, too_deep
-from shapeprog.language.placement import LONGEST_SIDE, MOST_SOLIDS, SIZES
+from shapeprog.language.placement import MOST_SOLIDS, SIZES
 from shapeprog.language.program import DEEPEST, Node, Program
 from shapeprog.language.statement import language
 from shapeprog.language.unit import Unit
+from shapeprog.space import SPAN
 
 MOST_STATEMENTS = 1 << 16
 """Most statements, loops and calls that calls may expand to: a function may call another twice, that one a third..."""
@@ -70,7 +71,7 @@ def placed_source(lines: tuple[Line, ...], unit: str = "", warnings: tuple[str, 
         for line in lines:
             if isinstance(line, Assignment) and not set(SIZES) <= names.keys():
                 names |= {name: value_at(value, names) for name, value in line.numbers}
-        cells = LONGEST_SIDE / max(names[size] for size in SIZES)
+        cells = SPAN / max(names[size] for size in SIZES)
         scale = Scale(cells, -names["height"] * cells / 2)
         per_cell = Unit(unit, 1 / cells)
     except (ShapeProgError, ArithmeticError):  # evaluation reports the mistake

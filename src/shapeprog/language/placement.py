@@ -89,7 +89,6 @@ BOX_IN_CELLS = ("bottom", "front", "left", "height", "depth", "width")
 ATTRIBUTES = frozenset(["radius", "edge", "tilt", "lean", "turn", "step", "gap"])
 """Keywords that may be names of numbers, but not of functions."""
 
-LONGEST_SIDE = 24.0  # cells of the longest side of the whole, as read
 MOST_SOLIDS = 1 << 17  # most solids, and most evaluated bodies
 LEAST_ALONG = 0.25  # least share of its length that a bar covers along the axis that its two sizes leave open
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from shapeprog.language.program import Program
 from shapeprog.language.reader import BEGIN
 from shapeprog.language.unroll import exact_scene
 from shapeprog.space import Frame
+
+CREASE = math.radians(40)  # angle between the normals of two triangles from which their common edge is sharp
 
 Vertices = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int64]
@@ -112,15 +115,15 @@ def part_normals(solids: Sequence[Part]) -> list[Vertices]:
     return np.split(normals, np.cumsum([len(part.faces) for part in solids[:-1]]))
 
 
-def crease_normals(vertices: Vertices, faces: Faces, angle: float = 40.0) -> Vertices:
+def crease_normals(vertices: Vertices, faces: Faces) -> Vertices:
     """Unit normals (F, 3, 3) of the corners of every triangle: smooth across shallow edges, sharp across steep ones.
 
     The normal of a corner is the area-weighted mean over the triangles at its vertex that belong to the same smooth
-    surface: those that are connected by edges with less than ``angle`` degrees between the normals on both sides.
+    surface: those that are connected by edges with less than ``CREASE`` between the normals on both sides.
     """
     area, flat = triangle_normals(vertices, faces)
     pairs = _shared_edges(faces) // 3
-    pairs = pairs[:, (flat[pairs[0]] * flat[pairs[1]]).sum(1) > np.cos(np.radians(angle))]
+    pairs = pairs[:, (flat[pairs[0]] * flat[pairs[1]]).sum(1) > math.cos(CREASE)]
     surface = linked(pairs.T, len(faces))
     _, corner = np.unique(faces * len(faces) + surface[:, None], return_inverse=True)
     corner = corner.reshape(-1)
@@ -138,7 +141,7 @@ def crease_edges(faces: Faces, normals: Vertices) -> Faces:
     across = (normals + np.roll(normals, -1, 1)).reshape(-1, 3)
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
     one, other = _shared_edges(faces)
-    smooth = (across[one] * across[other]).sum(1) > 0.77  # 40 degrees
+    smooth = (across[one] * across[other]).sum(1) > math.cos(CREASE)
     start = np.delete(np.arange(faces.size), np.concatenate([one[smooth], other]))
     return np.stack([start, start - start % 3 + (start + 1) % 3], 1)
 

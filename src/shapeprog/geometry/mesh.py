@@ -39,7 +39,7 @@ class PartMesh(NamedTuple):
     faces: IntArray
 
 
-class Solids(NamedTuple):
+class SceneNumbers(NamedTuple):
     """The numbers of the primitives of one scene as arrays, and which of them are solid: not degenerate, nor padding.
 
     ``half`` are half extents of the box around each in its local frame.
@@ -52,7 +52,7 @@ class Solids(NamedTuple):
     half: FloatArray
 
 
-def solids_of(scene: Batch) -> Solids:
+def solids_of(scene: Batch) -> SceneNumbers:
     """The primitives of one scene; a ``ShapeProgError`` if given a batch, or a part lies beyond ``FARTHEST``."""
     if scene.batch_shape:
         message = f"a batch of shape {tuple(scene.batch_shape)} has no single mesh"
@@ -71,7 +71,7 @@ def solids_of(scene: Batch) -> Solids:
             f"{int(far.sum())} of {int(solid.sum())} parts reach farther than {FARTHEST} cells from the centre",
             "lower their positions, sizes or shifts: nearer to it, single precision still tells cells apart",
         )
-    return Solids(solid, size, centre, rotation, reach)
+    return SceneNumbers(solid, size, centre, rotation, reach)
 
 
 def part_meshes(scene: Batch, most: float | None = None) -> list[PartMesh]:

@@ -28,10 +28,10 @@ from shapeprog.formats.json_form import Result, read_result
 from shapeprog.geometry.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import Array, Frame
+from shapeprog.space import Array
 
-Prediction = tuple[Program, Program | None, Frame | None] | Shape
-"""A program with its whole-numbered form and its frame where the file holds them, or a shape."""
+Prediction = Result | Shape
+"""The contents of a program file, or a shape."""
 
 
 def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:
@@ -50,7 +50,7 @@ def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str,
         except ShapeProgError as error:
             yield file, file.stem, error
         else:
-            yield file, file.stem, (result.program, result.snapped, result.frame)
+            yield file, file.stem, result
     if not files:
         for file, shape in load_all([path], points=points, seed=seed):
             yield file, (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
@@ -76,7 +76,7 @@ def read_targets(
 
 def in_pose_of(prediction: Prediction, target: Shape, points: int, seed: int) -> Shape:
     """The target, loaded again in the axes stored with a predicted program; unchanged for meshes and point clouds."""
-    frame, path = None if isinstance(prediction, Shape) else prediction[2], path_of(target)
+    frame, path = None if isinstance(prediction, Shape) else prediction.frame, path_of(target)
     if frame is None or path is None or np.allclose(frame.axes, target.frame.axes, atol=1e-6):
         return target
     return load_in_axes(path, frame, points=2 * points, seed=seed)
@@ -86,8 +86,8 @@ def aligned(prediction: Prediction, target: Shape) -> Prediction:
     """A predicted program in the grid of its target; shapes are unchanged."""
     if isinstance(prediction, Shape):
         return prediction
-    program, snapped, frame = prediction
-    return in_grid_of(program, frame, target.frame), snapped, target.frame
+    program = in_grid_of(prediction.program, prediction.frame, target.frame)
+    return prediction._replace(program=program, frame=target.frame)
 
 
 def measure(prediction: Prediction | ShapeProgError, target: Shape | None, points: int, seed: int) -> Metrics:
@@ -98,7 +98,7 @@ def measure(prediction: Prediction | ShapeProgError, target: Shape | None, point
         raise InputError("there is no target of this name", "give both the same name")
     if isinstance(prediction, Shape):
         return _measure_shape(prediction, target, points, seed)
-    return evaluate_program(prediction[0], target, prediction[1], points, seed, looks=True)
+    return evaluate_program(prediction.program, target, prediction.snapped, points, seed, looks=True)
 
 
 def with_parts(row: Metrics, program: Program, target: Shape, files: list[Path], seed: int) -> Metrics:

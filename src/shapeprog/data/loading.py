@@ -133,16 +133,13 @@ def load_all(
                 yield file_path, error
                 continue
             for number in numbers:
-                label = file_path if len(held) == 1 else Path(f"{file_path}#{number}")
-                yield label, _made(held, number)
+                shape: Shape | ShapeProgError
+                try:
+                    shape = held[number]
+                except ShapeProgError as error:
+                    shape = error
+                yield (file_path if len(held) == 1 else Path(f"{file_path}#{number}")), shape
         yield from skipped
-
-
-def _made(held: _Held, number: int) -> Shape | ShapeProgError:
-    try:
-        return held[number]
-    except ShapeProgError as error:
-        return error
 
 
 def readable_suffixes() -> set[str]:

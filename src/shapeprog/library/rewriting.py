@@ -42,10 +42,12 @@ def with_library(program: Program, library: Library) -> Program:
     """
     try:
         original = placed(program)
-        cells = _separated(named_cells(original))
+        cells = named_cells(original)
     except ShapeProgError:
         return program
-    selected = _offered(cells, library)
+    cells = replace(cells, lines=tuple(separate_loops(cells.lines)))  # one statement in each nest of loops
+    names = names_of(cells)
+    selected = _selected(cells, [pattern for pattern in library.patterns if pattern.function.name not in names])
 
     def written_with(some: Sequence[Offer]) -> tuple[float, Program]:
         try:
@@ -79,11 +81,6 @@ def _called(selected: Sequence[Offer], library: Library) -> list[Function]:
     return [function for name, function in library.source.functions.items() if name in names]
 
 
-def _separated(source: Source) -> Source:
-    """A program in cells with one statement in each nest of loops."""
-    return replace(source, lines=tuple(separate_loops(source.lines)))
-
-
 class Offer(NamedTuple):
     """A call that could replace some lines of a program, inside the loops around the first of them.
 
@@ -95,11 +92,6 @@ class Offer(NamedTuple):
     call: Call
     lines: tuple[int, ...]
     around: tuple[Loop, ...]
-
-
-def _offered(cells: Source, library: Library) -> list[Offer]:
-    names = names_of(cells)
-    return _selected(cells, [pattern for pattern in library.patterns if pattern.function.name not in names])
 
 
 def matchers_of(source: Source) -> Iterator[tuple[Matcher, tuple[Loop, ...]]]:

@@ -8,7 +8,8 @@ import pytest
 
 from shapeprog.errors import InputError, ProgramError, ShapeProgError
 from shapeprog.formats.json_form import program_from_json
-from shapeprog.language import Draw, Language, Loop, Program, decode, encode, using
+from shapeprog.formats.parts import parts
+from shapeprog.language import Draw, Language, Loop, Program, decode, encode, unroll, using
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 
@@ -196,6 +197,11 @@ def test_programs_made_wrongly_are_refused_in_words() -> None:
         format_program(Program((Draw("stool", ()),)))
     with pytest.raises(ShapeProgError, match="has 2 numbers instead of 6"):
         format_program(Program((Draw("leg", (1.0, 2.0)),)))
+    for use in (encode, unroll, parts):
+        with pytest.raises(ShapeProgError, match="unknown statement 'stool'"):
+            use(Program((Draw("stool", ()),)))
+        with pytest.raises(ShapeProgError, match="has 2 numbers instead of 6"):
+            use(Program((Draw("leg", (1.0, 2.0)),)))
     with using(Language()), pytest.raises(ProgramError, match="unknown statement 'leg'"):
         parse(LEG)
 

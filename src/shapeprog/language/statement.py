@@ -222,8 +222,8 @@ class Language:
         """The statement or loop of a name; a ``ShapeProgError`` if there is none with so many numbers."""
         if name not in self:
             raise ShapeProgError(f"unknown statement {name!r}", "load the module that declares it")
-        if numbers != self[name].size:
-            raise ShapeProgError(f"{name} has {numbers} numbers instead of {self[name].size}", "correct the program")
+        if numbers != (right := len(self[name].quantities)):
+            raise ShapeProgError(f"{name} has {numbers} numbers instead of {right}", "correct the program")
         return self[name]
 
     def called(self, word: str) -> Role | Statement:

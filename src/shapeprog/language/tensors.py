@@ -51,8 +51,8 @@ def encode(
     """Tensors of programs: (B, K, J) for a sequence, (K, J) for one program.
 
     There are as many steps J as the longest block has, at least the published three, and as many blocks K as the
-    longest program has, or as are asked for; a ``ShapeProgError`` if a program has more.  There are as many slots as
-    the longest statement takes, at least the published seven.
+    longest program has, or as are asked for.  There are as many slots as the longest statement takes, at least the
+    published seven.  A ``ShapeProgError`` if a program has more blocks, or a statement that is not declared so.
     """
     batch = list(programs) if isinstance(programs, Iterable) else [programs]
     if not all(isinstance(program, Program) for program in batch):
@@ -73,7 +73,7 @@ def encode(
     for b, program in enumerate(chains):
         for k, chain in enumerate(program):
             for j, node in enumerate(chain):
-                ids[b, k, j] = registry[node.name].id
+                ids[b, k, j] = registry.declaration(node.name, len(node.values)).id
                 parameters[b, k, j, : len(node.values)] = node.values
                 if isinstance(node, Draw) and node.role:
                     roles[b, k] = registry.roles[node.role].id

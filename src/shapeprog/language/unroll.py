@@ -59,7 +59,8 @@ def unroll(program: Program | Sequence[Program] | Code, *, shortest: float = 0.0
 
 def on_numpy_if_shipped(program: Program) -> AbstractContextManager[None]:
     """Draw without torch within, if it is not loaded yet and every statement of a program comes with the package."""
-    return on_numpy(all(language()[node.name].ships for node in program.walk()))
+    names = {node.name for node in program.walk()}
+    return on_numpy(all(name in language() and language()[name].ships for name in names))
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeprog.formats.colours import hexadecimal
+from shapeprog.formats.frames import frame_of_text
 from shapeprog.formats.parts import Part as Mesh
 from shapeprog.formats.parts import parts
 from shapeprog.language.ast import (
@@ -111,13 +112,12 @@ def script(program: Program, frame: Frame, reserved: Collection[str], inner: str
 
 def world_of(source: Source, frame: Frame) -> FloatArray:
     """The map (4, 4) from the coordinates of placed text to those of a file; rounded to nine digits of its scale."""
-    scale = source.scale
-    assert scale is not None
-    k = scale.cells_per_unit
-    world = frame.matrix() @ np.array([[0, 0, k, scale.floor], [0, k, 0, scale.middle], [-k, 0, 0, 0], [0, 0, 0, 1]])
-    size = float(np.linalg.norm(world[:3, 0]))
-    world[:3, :3] = np.round(world[:3, :3] / size, 9) * float(f"{size:.7g}")
-    world[:3, 3] = np.where(np.abs(world[:3, 3]) < 1e-6 * size * SPAN / k, 0, world[:3, 3])
+    assert source.scale is not None
+    text = frame_of_text(frame, source.scale)
+    world = text.matrix()
+    world[:3, :3] = np.round(text.axes, 9) * float(f"{text.scale:.7g}")
+    nothing = 1e-6 * text.scale * SPAN / source.scale.cells_per_unit
+    world[:3, 3] = np.where(np.abs(world[:3, 3]) < nothing, 0, world[:3, 3])
     return world + 0.0
 
 

@@ -73,6 +73,8 @@ def test_infer_writes_programs(run: Run, here: Path):
     assert ended.out.count("IoU 0.") == 3
     assert sorted(path.name for path in (here / "out").iterdir()) == ["s0.shape", "s1.shape", "table.shape"]
     assert sp.load(here / "out" / "table.shape").blocks > 0
+    ended = run("paper", "infer", "gone.obj")
+    assert (ended.code, "there is no file gone.obj" in ended.err) == (2, True), ended.err
 
 
 def test_a_users_loss_adapts_and_an_interrupted_run_is_resumed_by_the_same_command(run: Run, here: Path):

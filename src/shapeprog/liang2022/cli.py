@@ -51,11 +51,10 @@ def infer_command(
     from shapeprog.formats import save
     from shapeprog.liang2022 import decode, load_generator
 
-    generator, failed = load_generator(weights), False
+    generator, failures, code = load_generator(weights), list[ShapeProgError](), terminal.MISTAKE
     for _, shape in load_all(inputs):
         if isinstance(shape, ShapeProgError):
-            terminal.complain(shape)
-            failed = True
+            failures.append(shape)
             continue
         cells = torch.from_numpy(shape.voxels).byte()[None]
         decoded = decode(generator, cells, decoder=decoder, blocks=blocks)  # type: ignore[arg-type]
@@ -64,8 +63,8 @@ def infer_command(
         terminal.print_program(program)
         if out is not None:
             save(program, make_folder(out) / f"{shape.name}.shape")
-    if failed:
-        raise typer.Exit(1)
+        code = terminal.FAILED
+    terminal.finish(failures, code)
 
 
 @app.command("sample")

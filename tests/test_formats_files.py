@@ -376,6 +376,22 @@ def test_a_wrong_frame_of_a_placed_text_has_its_place(entries: str, column: int,
     assert "write it as # placed: up y" in caught.value.hint
 
 
+@pytest.mark.parametrize(
+    "frame",
+    [
+        *(Frame(scale) for scale in (0.0, -1.0, float("nan"), float("inf"))),
+        Frame(centre=(float("inf"), 0, 0)),
+        Frame(axes=((2, 0, 0), (0, 1, 0), (0, 0, 1))),
+        Frame(axes=((-1, 0, 0), (0, 1, 0), (0, 0, 1))),
+    ],
+)
+def test_a_frame_that_would_not_be_read_back_is_not_saved(frame: Frame, tmp_path: Path):
+    for name in ("a.shape", "a.json"):
+        with pytest.raises(OutputError, match="cannot be stored"):
+            sp.save(parse(PLACED), tmp_path / name, frame)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_json_lists_the_solids_with_their_lines_and_bounds():
     content = json.loads(program_to_json(parse(PLACED), lies(".stl"), scores={"iou": 0.5}))
     lines = content["text"].splitlines()

@@ -110,6 +110,7 @@ def test_a_users_loss_adapts_and_an_interrupted_run_is_resumed_by_the_same_comma
         ([*ADAPT.split(), "--device", "gpu"], "unknown device 'gpu'"),
         ([*ADAPT.split(), "--with", "gone.py"], "there is no file gone.py"),
         ([*ADAPT.split(), "--with", "one.py", "--with", "two.py"], "the loss 'reach' is declared twice"),
+        ([*ADAPT.split(), "--with", "table.obj/a.py"], "table.obj/a.py cannot be read: a part of its path is a file"),
         ([*ADAPT.split(), "--with", "table.obj"], "table.obj raised SyntaxError"),
         ([*ADAPT.split(), "--method", "guided", "--executor", "gone.safetensors"], "there is no file gone.safetensors"),
         (["paper", "infer", "few.npz", "--weights", "small.safetensors", "--decoder", "selct"], "did you mean select"),

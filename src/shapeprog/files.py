@@ -1,6 +1,6 @@
-"""Atomic files: every output is written to a temporary file in the same folder, then renamed.
+"""Files: only regular ones are read; every output is written to a temporary one in the same folder, then renamed.
 
-This holds after a power failure, too: the content reaches the disk before the file is renamed.
+An output is whole after a power failure, too: its content reaches the disk before the file is renamed.
 """
 
 from __future__ import annotations
@@ -9,11 +9,12 @@ import contextlib
 import errno
 import os
 import secrets
+import stat
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from shapeprog.errors import OutputError
+from shapeprog.errors import InputError, OutputError
 
 if sys.platform == "win32":
     import msvcrt
@@ -35,6 +36,16 @@ _CURES = {
     errno.ENAMETOOLONG: ("the name is too long", "choose a shorter name"),
 }
 
+_UNREADABLE = {
+    errno.EACCES: ("there is no permission to read it", "change its permissions, or leave it out"),
+    errno.EPERM: ("there is no permission to read it", "change its permissions, or leave it out"),
+    errno.ENOENT: ("it is not there", "check the path"),
+    errno.ENOTDIR: ("a part of its path is a file, not a folder", "correct the path"),
+    errno.EISDIR: ("it is a folder", "name a file in it"),
+    errno.ELOOP: ("it is a link that leads to itself", "correct the link"),
+    errno.ENAMETOOLONG: ("its name is too long", "check the path"),
+    errno.EIO: ("the disk has a fault there", "copy the file from where it came from"),
+}
 
 _UNFINISHED = "." + 8 * "[0-9a-f]" + "~*"  # pattern of the names of temporary files
 
@@ -146,3 +157,31 @@ def output_error(path: Path, error: OSError) -> OutputError:
     """The error in words for an ``OSError`` met while writing ``path``."""
     cause, cure = _CURES.get(error.errno or 0, (error.strerror or str(error), "check the path and the disk"))
     return OutputError(f"cannot write {path}: {cause}", cure)
+
+
+def check_file(path: Path) -> None:
+    """Refuse everything but regular files (a pipe or a device may never end) before it is opened.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is a folder, a pipe, a socket or a device, or the system refuses access.
+    """
+    try:
+        kind = os.stat(path).st_mode
+    except FileNotFoundError as error:
+        raise InputError(f"there is no file {path}", "check the path") from error
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except ValueError as error:  # a zero byte in the name
+        raise InputError(f"there is no file {str(path)!r}", "check the path") from error
+    if stat.S_ISDIR(kind):
+        raise InputError(f"{path} is a folder", "name a file in it; load_all reads the shapes of a folder")
+    if not stat.S_ISREG(kind):
+        raise InputError(f"{path} is a pipe, a socket or a device, no file", "copy its content to a file first")
+
+
+def unreadable(path: Path, error: OSError) -> InputError:
+    """The error in words for an ``OSError`` met while reading a file or a folder."""
+    cause, cure = _UNREADABLE.get(error.errno or 0, (error.strerror or "the system refuses it", "check the path"))
+    return InputError(f"{path} cannot be read: {cause}", cure)

@@ -22,12 +22,12 @@ from shapeprog.data.reading import (
     POINTS,
     SHAPES,
     check_count,
-    check_file,
     few,
     in_words,
     read_whole,
 )
 from shapeprog.errors import InputError
+from shapeprog.files import check_file
 from shapeprog.space import Array
 
 Stream = IO[bytes] | io.BufferedIOBase

@@ -6,8 +6,8 @@ import os
 from collections.abc import Collection
 from pathlib import Path
 
-from shapeprog.data.reading import unreadable
 from shapeprog.errors import ShapeProgError
+from shapeprog.files import unreadable
 
 Skipped = list[tuple[Path, ShapeProgError]]
 """Folders that could not be read, each with its error; the functions of this module add to it."""

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from shapeprog.data.arrays import SHAPES_OF_ARRAYS, check_shape
-from shapeprog.data.reading import BYTES, check_count, check_file, few, in_words
+from shapeprog.data.reading import BYTES, check_count, few, in_words
 from shapeprog.errors import InputError
+from shapeprog.files import check_file
 from shapeprog.space import Array
 
 _CHUNK = 2**28

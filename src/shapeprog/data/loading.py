@@ -15,10 +15,11 @@ from shapeprog.data.folders import Skipped, files_below
 from shapeprog.data.meshes import COMMON, mesh_formats, read_mesh
 from shapeprog.data.orientation import AUTO, axes_of, default_axes, in_shapenet_layout
 from shapeprog.data.placement import shape_from_mesh, shape_from_points, shape_from_voxels
-from shapeprog.data.reading import BYTES, POINTS, check_count, check_file, in_words
+from shapeprog.data.reading import BYTES, POINTS, check_count, in_words
 from shapeprog.data.shape import Shape
 from shapeprog.data.uprightness import find_up
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.files import check_file
 from shapeprog.formats.format import suffixes
 from shapeprog.formats.shape import read_text
 from shapeprog.language.unit import metres

@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 
 from shapeprog.data.arrays import members, read_head, read_numpy
-from shapeprog.data.reading import POINTS, check_count, check_file, few, in_words
+from shapeprog.data.reading import POINTS, check_count, few, in_words
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError
-from shapeprog.files import atomic_path
+from shapeprog.files import atomic_path, check_file
 from shapeprog.space import LEAST_SIDE, MOST_SIDE, RESOLUTION, SPAN, Array, Frame
 
 _BYTES = RESOLUTION**3 // 8

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import os
-import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from shapeprog.errors import InputError, ShapeProgError
+from shapeprog.files import check_file, unreadable
 
 BYTES = 2**30
 """Most bytes of a file that is read whole, and of an array once it is unpacked: 1 GiB."""
@@ -29,37 +28,6 @@ ANY_NUMBERS = np.errstate(invalid="ignore", over="ignore")
 """Context for arbitrary numbers of a file; numbers that are not finite are reported when a shape is made."""
 
 _FEW = 5
-
-_UNREADABLE = {
-    errno.EACCES: ("there is no permission to read it", "change its permissions, or leave it out"),
-    errno.EPERM: ("there is no permission to read it", "change its permissions, or leave it out"),
-    errno.ENOENT: ("it is not there", "check the path"),
-    errno.ENOTDIR: ("a part of its path is a file, not a folder", "correct the path"),
-    errno.EISDIR: ("it is a folder", "name a file in it"),
-    errno.ELOOP: ("it is a link that leads to itself", "correct the link"),
-    errno.ENAMETOOLONG: ("its name is too long", "check the path"),
-    errno.EIO: ("the disk has a fault there", "copy the file from where it came from"),
-}
-
-
-def check_file(path: Path) -> None:
-    """Refuse everything but regular files (a pipe or a device may never end) before it is opened.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is a folder, a pipe, a socket or a device.
-    """
-    try:
-        kind = os.stat(path).st_mode
-    except FileNotFoundError as error:
-        raise InputError(f"there is no file {path}", "check the path") from error
-    except ValueError as error:  # a zero byte in the name
-        raise InputError(f"there is no file {str(path)!r}", "check the path") from error
-    if stat.S_ISDIR(kind):
-        raise InputError(f"{path} is a folder", "name a file in it, or read the whole folder with load_all")
-    if not stat.S_ISREG(kind):
-        raise InputError(f"{path} is a pipe, a socket or a device, no file", "copy its content to a file first")
 
 
 def read_whole(path: Path) -> bytes:
@@ -103,12 +71,6 @@ def in_words(path: Path, kind: str = "") -> Iterator[None]:
         raise unreadable(path, error) from error
     except Exception as error:
         raise _damaged(path, kind) from error
-
-
-def unreadable(path: Path, error: OSError) -> InputError:
-    """The error in words for an ``OSError`` met while reading a file or a folder."""
-    cause, cure = _UNREADABLE.get(error.errno or 0, (error.strerror or "the system refuses it", "check the path"))
-    return InputError(f"{path} cannot be read: {cause}", cure)
 
 
 def few(names: Iterable[object]) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import stat
 from pathlib import Path
 
 from shapeprog.errors import InputError
+from shapeprog.files import check_file, unreadable
 from shapeprog.formats.frames import frame_comment, frame_of_grid, scale_of, split_frame
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
@@ -36,21 +36,14 @@ def program_text(program: Program, frame: Frame | None) -> str:
 def read_text(path: str | os.PathLike[str]) -> str:
     """The text of a UTF-8 file, with or without a byte order mark; an ``InputError`` if the file cannot be read, is no
     regular file, is larger than ``LARGEST_FILE``, or is not UTF-8."""
+    file = Path(path)
+    check_file(file)
     try:
-        status = os.stat(path)
-        if stat.S_ISDIR(status.st_mode):
-            raise InputError(f"{path} is a folder, not a file", "name a file in it")
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{path} is not a regular file", "name a file on a disk")
-        if status.st_size > LARGEST_FILE:
+        if file.stat().st_size > LARGEST_FILE:
             raise InputError(f"{path} is larger than {LARGEST_FILE / 1e6:.0f} MB", "check that it is a program")
-        return Path(path).read_bytes().decode("utf-8-sig")
-    except FileNotFoundError as error:
-        raise InputError(f"there is no file {path}", "check the path") from error
+        return file.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         message = f"{path} is not text: byte {error.start} is not UTF-8"
         raise InputError(message, "save it as UTF-8, or check that it is a program") from error
     except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}", "check the path and its permissions") from error
-    except ValueError as error:
-        raise InputError(f"{str(path)!r} is not a valid file name", "check the path") from error
+        raise unreadable(file, error) from error

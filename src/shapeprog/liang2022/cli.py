@@ -156,7 +156,7 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         files: Annotated[list[Path] | None, typer.Option("--with", help="Python files that declare losses.")] = None,
         **options: Any,
     ) -> None:
-        from shapeprog.data.reading import check_file
+        from shapeprog.files import check_file
         from shapeprog.liang2022.loop import train, tune_allocator
 
         tune_allocator()

@@ -20,9 +20,9 @@ from safetensors import safe_open
 from safetensors.torch import save
 from torch import Tensor, nn
 
-from shapeprog.data.reading import check_count, check_file, in_words
+from shapeprog.data.reading import check_count, in_words
 from shapeprog.errors import InputError, OutputError, ShapeProgError, did_you_mean
-from shapeprog.files import write_bytes
+from shapeprog.files import check_file, write_bytes
 from shapeprog.liang2022.executor import NeuralExecutor
 from shapeprog.liang2022.fast import Fast
 from shapeprog.liang2022.generator import Generator

@@ -96,6 +96,21 @@ def test_commands_on_program_text_start_without_torch(tmp_path: Path, words: lis
     assert done.stdout.splitlines()[-1] == "0 False", done.stderr
 
 
+def test_a_thread_that_loads_torch_does_not_change_it_for_one_that_draws_without(tmp_path: Path) -> None:
+    code = """
+import threading
+import numpy as np
+from shapeprog.lazy_torch import on_numpy, torch
+with on_numpy(True):
+    thread = threading.Thread(target=lambda: print(torch.eye(2).requires_grad_()))
+    thread.start()
+    thread.join()
+    print(torch.eye(2) @ np.ones(2))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.returncode, done.stdout.splitlines()[-1:]) == (0, ["[1. 1.]"]), done.stderr
+
+
 def test_declarations_that_ship_pass_the_trial_that_those_of_users_do() -> None:
     for declared in standard:
         _try(declared)

@@ -7,7 +7,6 @@ Importing torch takes longer than drawing a program.  If it is loaded when this 
 
 from __future__ import annotations
 
-import importlib
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -113,13 +112,14 @@ _NUMPY = SimpleNamespace(
 
 
 class _Torch:
-    """The module; its attributes are cached on first access."""
+    """The module, or NumPy; nothing is cached, because threads may differ in which of them they use."""
 
     def __getattr__(self, name: str) -> Any:
         if _without_torch.get():
             return getattr(_NUMPY, name)
-        value = self.__dict__[name] = getattr(importlib.import_module("torch"), name)
-        return value
+        import torch as module
+
+        return getattr(module, name)
 
 
 if TYPE_CHECKING or "torch" in sys.modules:

@@ -73,6 +73,10 @@ def test_infer_writes_programs(run: Run, here: Path):
     assert ended.out.count("IoU 0.") == 3
     assert sorted(path.name for path in (here / "out").iterdir()) == ["s0.shape", "s1.shape", "table.shape"]
     assert sp.load(here / "out" / "table.shape").blocks > 0
+    (here / "more").mkdir()
+    (here / "more" / "table.obj").write_bytes((here / "table.obj").read_bytes())
+    assert run("paper", "infer", "table.obj", "more/table.obj", "--out", "twice").code == 0
+    assert sorted(path.name for path in (here / "twice").iterdir()) == ["table.shape", "table_2.shape"]
     ended = run("paper", "infer", "gone.obj")
     assert (ended.code, "there is no file gone.obj" in ended.err) == (2, True), ended.err
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,12 +64,18 @@ def free_stem(shape: Shape, stems: set[str], folder: Path, overwrite: bool = Fal
     The same input may replace its own results, which are known by their .json; a ``ShapeProgError`` if their .shape
     differs from the text in it, unless ``overwrite``.
     """
-    base = re.sub(r"[^\w.\-]+", "_", shape.name).strip("._")[:_LONGEST] or "shape"
+    stem = unused_stem(shape.name, lambda stem: stem in stems or not _replaceable(shape, folder, stem, overwrite))
+    stems.add(stem)
+    return stem
+
+
+def unused_stem(name: str, is_used: Callable[[str], bool]) -> str:
+    """The name of a shape as that of a file, with a number behind it where it is used."""
+    base = re.sub(r"[^\w.\-]+", "_", name).strip("._")[:_LONGEST] or "shape"
     stem, number = base, 1
-    while stem in stems or not _replaceable(shape, folder, stem, overwrite):
+    while is_used(stem):
         number += 1
         stem = f"{base}_{number}"
-    stems.add(stem)
     return stem
 
 

@@ -46,12 +46,14 @@ def infer_command(
     """
     import torch
 
+    from shapeprog.cli.results import unused_stem
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
     from shapeprog.formats import save
     from shapeprog.liang2022 import decode, load_generator
 
     generator, failures, code = load_generator(weights), list[ShapeProgError](), terminal.MISTAKE
+    stems = set[str]()
     for _, shape in load_all(inputs):
         if isinstance(shape, ShapeProgError):
             failures.append(shape)
@@ -62,7 +64,9 @@ def infer_command(
         terminal.output().print(f"# {shape.name}: canvas IoU {float(decoded.iou()):.3f}")
         terminal.print_program(program)
         if out is not None:
-            save(program, make_folder(out) / f"{shape.name}.shape")
+            stem = unused_stem(shape.name, stems.__contains__)
+            stems.add(stem)
+            save(program, make_folder(out) / f"{stem}.shape")
         code = terminal.FAILED
     terminal.finish(failures, code)
 

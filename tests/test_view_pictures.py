@@ -256,7 +256,7 @@ def test_roles_that_occur_together_have_distinct_colours():
 def test_the_page_needs_nothing_else_and_escapes_what_it_is_told(tmp_path: Path):
     path = viewer(PROGRAM, tmp_path / "view.html", shape=box_shape(), title="</script><b>&", scores={"iou": 0.5})
     text = path.read_text()
-    assert not re.search(r"""(src|href)=|https?://|@import|fetch\(""", text)
+    assert not re.search(r"""(src|href)="|https?://|@import|fetch\(""", text)
     assert text.count("</script>") == 2
     data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL).group(1))  # type: ignore[union-attr]
     assert data["title"] == "</script><b>&"
@@ -312,6 +312,7 @@ def test_numbers_of_a_program_in_a_unit_are_dragged_in_it(tmp_path: Path):
     content = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
     assert [slider["unit"] for slider in content["sliders"]] == ["m", "m", "m", ""]
     assert content["digits"] == 4
+    assert content["scale"] == pytest.approx(40), "saved STL files are in millimetres"
     assert content["lines"][0]["before"] == "# unit: m"
 
 

@@ -149,7 +149,8 @@ def inferred(task: Task, shape: Any) -> tuple[Any, Any]:
 
     if task.method == "tied":
         evidence = evidence_of(shape, task.seed)
-        tied = tie(between_ends(parse(task.program)), evidence, price=task.price, seed=task.seed)
+        floor = float(evidence.surface[:, 0].min())
+        tied = tie(between_ends(parse(task.program)), evidence, price=task.price, floor=floor, seed=task.seed)
         return merged(tied), None
     statements: Literal["all", "paper"] = "paper" if task.method == "paper" else "all"
     ties = task.method != "untied"

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 import shapeprog as sp
 from benchmarks.editing import edit_scores, multiplied
 from shapeprog.cli.app import app
+from shapeprog.formats.parts import parts
 from shapeprog.geometry.mesh import pieces, union_mesh
 from shapeprog.inference.candidates.drawings import between_ends
 from shapeprog.inference.fit.joints import find_joints
@@ -105,6 +106,32 @@ seat(box(at=(-1.08, -5.04, -12), size=(1.2, 10.08, 24)))
     tied = tie(program, evidence_of_program(program))
     high = sp.set(tied, height=1.3 * next(named.value for named in sp.names(tied) if named.name == "height"))
     assert 2 * unroll(high).bounds[0, 0] == pytest.approx(1.7, abs=0.1)
+
+
+def test_no_tie_moves_a_part_beyond_the_whole():
+    """The axes of the feet are nearly in the sides of the base, where a tie would have saved two numbers."""
+    program = sp.parse(
+        dedent("""
+        width, depth, height = 24, 7.8, 9.8
+        body(left=0.05, right=0.05, front=0.3, rear=0.02, bottom=2.23, top=0.05)
+        for _ in mirror(x=0, y=0):
+            foot(cylinder(left=0.04, front=0, height=2.06, radius=0.22))
+        base(width=23.9, bottom=1.81, height=0.42)
+        door(left=0, front=0.09, depth=0.2, bottom=2.23)
+    """)
+    )
+    tied = tie(Program(program.body), evidence_of_program(program))
+    extents = np.ptp(np.concatenate([part.vertices for part in parts(tied)]), axis=0)
+    assert tied.source is not None
+    np.testing.assert_allclose(extents[::-1], [tied.source.evaluated_numbers()[size] for size in SIZES], atol=0.01)
+
+
+@pytest.mark.parametrize(("beyond", "depth"), [(0.03, 8.0), (0.1, 8.2), (-0.2, 8.0), (-0.4, 7.2)])
+def test_the_whole_is_that_of_the_shape_where_parts_end_near_its_sides(beyond: float, depth: float):
+    program = sp.parse(f"box(at=(0, {-4 - beyond}, -6), size=(10, {8 + 2 * beyond}, 12))")
+    box = placed(program, floor=0.0, box=(np.array([0.0, -4.0, -6.0]), np.array([10.0, 4.0, 6.0])))
+    assert box.source is not None
+    assert box.source.evaluated_numbers()["depth"] == pytest.approx(depth)
 
 
 def test_what_fills_a_round_piece_needs_no_sides():

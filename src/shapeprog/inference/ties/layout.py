@@ -98,11 +98,13 @@ class Layout:
         self.jacobian: FloatArray = values[:, :-1] - values[:, -1:]
         self._offset = values[:, -1]
         # Rows (G, P) and lower bounds (G,) of their products with the numbers: no part may become thinner than
-        # ``THINNEST``, and no rod less than half as long.
+        # ``THINNEST``, no rod less than half as long, and no end of a part may leave the whole.
         rods = [self._along(line) for line in self._named if "end" in dict(line.keywords)]
-        self.bounded: FloatArray = np.vstack([self.jacobian, *rods])
-        shortest = [float(rod @ self.numbers) / 2 for rod in rods]
-        self.low: FloatArray = np.append(self.tunable.low.numpy() - self._offset, shortest)
+        unit, ends = np.eye(len(self.slots)), [end for end in self.ends() if end[0].key not in ("plane", "centre")]
+        inside = [side for element, low, high in ends for side in (low, unit[element.axis] - high)]
+        self.bounded: FloatArray = np.vstack([self.jacobian, *rods, *inside])
+        lowest = [float(rod @ self.numbers) / 2 for rod in rods] + [0.0] * len(inside)
+        self.low: FloatArray = np.append(self.tunable.low.numpy() - self._offset, lowest)
 
     def _along(self, line: Part | Group) -> FloatArray:
         """How the length of a rod along the axis that it runs along most follows from the numbers (P,)."""

@@ -124,7 +124,7 @@ def _of_numbers(layout: Layout, numbers: FloatArray) -> Iterator[Relation]:
         if slot.kind == "clearance" and slot.word.endswith("bottom") and numbers[k] < floor:
             yield Relation(eye[k], TIES.floor, limit=max(TIES.within, floor))
         elif slot.kind == "clearance" or (slot.kind == "gap" and abs(slot.value) <= TIES.touch):
-            yield Relation(eye[k])
+            yield Relation(eye[k], TIES.contact if abs(slot.value) <= TIES.zero else 1.0)  # reaches at the start
         elif slot.kind == "offset":
             limit = TIES.plane if slot.word.startswith("plane") else TIES.within
             yield Relation(eye[k], TIES.symmetric[slot.axis], limit=limit)

@@ -1,9 +1,8 @@
 """Ties: the numbers of a program that hold together are written with one name.
 
-Parts are placed from the sides of the whole; every face gets an anchor.  Relations between the numbers that nearly
-hold are priced by their cost in fit, those cheaper than a number are imposed, and the numbers that stay free are
-refitted.  Where a change of a shared number would separate parts, another is measured from it.  Shared numbers are
-then named.
+Parts are placed from the sides of the whole; every face gets an anchor.  Relations between numbers that nearly hold are
+priced by their cost in fit, those cheaper than a number are imposed, and the numbers that stay free are refitted.
+Where a change of a shared number would separate parts, another is measured from it.  Shared numbers are then named.
 """
 
 from __future__ import annotations
@@ -127,10 +126,8 @@ class _Ties:
         self.zero = 0.0 if known else TIES.zero  # a distance that somebody wrote stays
 
     def _is_exact(self, evidence: Evidence) -> bool:
-        """Whether relations that nearly hold mostly hold exactly, as in a drawing by CAD, and parts are components.
-
-        In other models, and where numbers are fitted, deviations are random.
-        """
+        """Whether relations that nearly hold mostly hold exactly, as in a drawing by CAD, and parts are components; in
+        other models, and where numbers are fitted, deviations are random."""
         numbers, scene = self.layout.numbers, self.layout.scene(self.layout.numbers)
         on = off_parts(scene, evidence).min(-1, initial=np.inf) <= TIES.component
         off = np.array([abs(each.row @ numbers) / np.abs(each.row).max() for each in self.related])

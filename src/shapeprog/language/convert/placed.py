@@ -40,8 +40,8 @@ from shapeprog.space import DEPTH, SIDE, UP, FloatArray
 EMPTY = 0.1
 """Share of the height that may be empty below the parts, as the feet that no part stands for."""
 
-NEAR = 0.3
-"""Cells between a side of the parts and of the shape that are a misfit, and no part that is missing."""
+NEAR, SLIGHT = 0.3, 0.05
+"""Cells by which parts may end inside and outside of a side of the shape: a misfit, and no part that is missing."""
 
 
 def placed(
@@ -87,7 +87,8 @@ def placed(
         middle[:] = scale.floor + extents[UP] / 2, scale.middle, 0.0
         low, high = middle - extents / 2, middle + extents / 2
     if box is not None:
-        low, high = (np.where(np.abs(a - b) <= NEAR, b, a) for a, b in zip((low, high), box, strict=True))
+        inside = np.stack([low - box[0], box[1] - high])
+        low, high = np.where((inside >= -SLIGHT) & (inside <= NEAR), box, (low, high))
     if floor is not None:
         if 0 < low[UP] - floor <= EMPTY * (high[UP] - floor):
             low[UP] = floor

@@ -70,6 +70,8 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
         (lambda: sp.unroll(CODE.having(CODE.parameters.half())), "parameters hold torch.float16"),
         (lambda: sp.unroll(CODE.having(CODE.parameters.bfloat16())), r"parameters hold torch.bfloat16\n.* float32"),
         (lambda: replace(CODE, parameters=CODE.parameters[:, :1]), r"parameters have the shape .*, ids \(1, 2, 3\)"),
+        (lambda: sp.evaluate(TEXT, BENCH), "is no program\n  hint: give a program, or the result of infer"),
+        (lambda: sp.evaluate(PROGRAM, BENCH, points=1), "points is 1\n"),
         (lambda: sp.infer(BENCH, detail=0), "detail is 0\n  hint: give a number above 0$"),
         (lambda: sp.infer(BENCH, detail=float("nan")), "detail is nan"),
         (lambda: sp.infer(BENCH, blocks=-1), "blocks is -1\n  hint: give a whole number of 0 or more$"),

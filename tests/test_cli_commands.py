@@ -6,7 +6,7 @@ import json
 import re
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ import pytest
 import trimesh
 from commands import FRAME, PROGRAM, Run, table
 
+import shapeprog as sp
 from shapeprog import inference, view
 from shapeprog.cli import main, terminal, writing
 from shapeprog.data import Shape, loading
@@ -472,6 +473,23 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
     assert "two halves of its points" in run("evaluate", "--help").out
     assert "IoU@32" not in shown.out
     assert "IoU@32" in run("evaluate", "programs", "targets", "--all").out
+
+
+def test_evaluate_in_python_gives_the_figures_of_the_command(run: Run, tmp_path: Path, program: Path):
+    cloud = FRAME.to_world(sp.sample(sp.unroll(PROGRAM), 12_000).points)
+    np.savetxt(tmp_path / "cloud.xyz", cloud)
+    table(tmp_path / "table.obj")
+    known_program, frame = load_with_frame(program)
+    for name in ("table.obj", "cloud.xyz"):
+        row = json.loads(run("evaluate", "table.json", name, "--json", "--points", 1000, "--seed", 3).out)["rows"][0]
+        known = sp.evaluate(known_program, name, frame, points=1000, seed=3)
+        loaded = sp.evaluate(known_program, load_shape(name, points=2000, seed=3), frame, points=1000, seed=3)
+        assert {name: value for name, value in asdict(known).items() if value == value} == row
+        assert repr(loaded) == repr(known)
+    with pytest.raises(sp.InputError, match="other axes than the target"):
+        sp.evaluate(known_program, replace(load_shape("cloud.xyz"), source=None), frame)
+    result = inference.Result(PROGRAM, PROGRAM.snap(), {}, "", (), 0.0)
+    assert sp.evaluate(result, "table.obj").cd == sp.evaluate(PROGRAM, load_shape("table.obj")).cd
 
 
 @pytest.mark.parametrize("suffix", [".json", ".shape"])

@@ -3,6 +3,8 @@ from .data.loading import load_shape
 from .data.random import random_program
 from .data.shape import Shape
 from .errors import InputError, OutputError, ProgramError, ShapeProgError
+from .evaluation.metrics import Metrics
+from .evaluation.scoring import evaluate
 from .formats.files import export, load, load_with_frame, save
 from .formats.json_form import program_from_json, program_to_json
 from .formats.plugins import load_statements
@@ -30,9 +32,9 @@ from .space import Frame
 __version__: str
 
 __all__ = [
-    "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Name", "Named", "OutputError",
-    "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
-    "chamfer", "coverage", "decode", "encode", "evaluated", "export", "format_program", "in_unit",
+    "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Metrics", "Name", "Named",
+    "OutputError", "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
+    "chamfer", "coverage", "decode", "encode", "evaluate", "evaluated", "export", "format_program", "in_unit",
     "infer", "inline", "learn", "liang2022", "load", "load_library", "load_shape", "load_statements",
     "load_with_frame", "loop", "names", "parse", "program_from_json", "program_to_json",
     "random_program", "refine", "sample", "save", "save_library", "set", "statement", "unroll",

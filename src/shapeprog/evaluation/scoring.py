@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 
+from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.data import load_all
 from shapeprog.data.loading import load_in_axes, path_of
 from shapeprog.data.parts import read_parts
@@ -19,7 +21,7 @@ from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
 from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.evaluation.likeness import Triangles
-from shapeprog.evaluation.metrics import Metrics, distances, evaluate_program, with_likeness
+from shapeprog.evaluation.metrics import POINTS, Metrics, distances, evaluate_program, with_likeness
 from shapeprog.evaluation.parts import part_scores
 from shapeprog.formats.files import load_with_frame, program_files
 from shapeprog.formats.format import suffixes
@@ -28,10 +30,58 @@ from shapeprog.formats.json_form import Result, read_result
 from shapeprog.geometry.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
-from shapeprog.space import Array
+from shapeprog.space import Array, Frame
+
+if TYPE_CHECKING:
+    from shapeprog.inference.infer import Result as Inferred
 
 Prediction = Result | Shape
 """The contents of a program file, or a shape."""
+
+
+def evaluate(
+    prediction: Program | Inferred,
+    target: Shape | str | Path,
+    frame: Frame | None = None,
+    *,
+    points: int = POINTS,
+    seed: int = 0,
+) -> Metrics:
+    """Measure how well a program rebuilds a shape, as the command ``shapeprog evaluate`` does.
+
+    Parameters
+    ----------
+    prediction
+        A program, or the result of :func:`shapeprog.infer`.
+    target
+        The shape that it should be, or its path.  A file is read in the axes of ``frame``.  Of a cloud ``2 * points``
+        points are read from a path, as by the command; a loaded shape is measured with the points that it has.
+    frame
+        Where a program from a file lies, as :func:`shapeprog.load_with_frame` gives it.  Without it the program is in
+        the grid of the target, as a result of inference is.
+    points
+        Points on each surface for CD and F1 at one cell.
+    seed
+        Seed of all samplings; the same seed gives the same figures.
+
+    Raises
+    ------
+    InputError
+        If the path is no readable shape, or a shape without a file has other axes than the frame.
+    ShapeProgError
+        If another argument is of the wrong kind or out of range.
+    """
+    check_number("points", points, 2, whole=True)
+    check_number("seed", seed, 0, MOST_SEED, whole=True)
+    program, snapped = getattr(prediction, "program", prediction), getattr(prediction, "snapped", None)
+    if not isinstance(program, Program):
+        raise ShapeProgError(f"{prediction!r} is no program", "give a program, or the result of infer")
+    result = Result(program, frame, snapped)
+    shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
+    shape = in_pose_of(result, shape, points, seed)
+    if frame is not None and not np.allclose(frame.axes, shape.frame.axes, atol=1e-6):
+        raise InputError("the program has other axes than the target", "make the target with the axes of the frame")
+    return measure(aligned(result, shape), shape, points, seed)
 
 
 def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:

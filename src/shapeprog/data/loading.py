@@ -172,7 +172,7 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
             cure = cures.get(suffix, f"known: {', '.join(sorted(readable_suffixes()))}")
             raise InputError(f"{path.name}: no shapes are read from files {ending}", cure)
         axes_of(path, up, front)  # wrong axes are reported before the file is read
-        make_shape, name = partial(_placed, path, up, front), _name(path)
+        make_shape, name = partial(placed, path, up, front), _name(path)
         if suffix in ARRAY_SUFFIXES:
             return _open_array(path, name, make_shape, points, seed)
         if suffix == ".binvox":
@@ -191,7 +191,9 @@ Place = Callable[..., Shape]
 """Makes a shape with the requested axes from a function of ``axes``; ``cloud=True`` for points in an array."""
 
 
-def _placed(path: Path, up: str | None, front: str | None, make: Callable[..., Shape], cloud: bool = False) -> Shape:
+def placed(path: Path, up: str | None, front: str | None, make: Callable[..., Shape], cloud: bool = False) -> Shape:
+    """The shape that a function of ``axes`` makes, in the requested axes, or those of the path; with a note if up is
+    estimated."""
     if up != AUTO:
         return make(axes=axes_of(path, up, front, cloud))
     default_shape = make(axes=axes_of(path, None, front, cloud))

@@ -58,14 +58,16 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
         vertices, faces = _joined(read_gltf(name, content, lambda other: _beside(path, other)))
     else:
         vertices, faces = _joined(_through_trimesh(suffix, content))
-    if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
-        wrong = faces.min() if faces.min() < 0 else faces.max()
-        raise InputError(
-            f"{name} has a face that names vertex {wrong}; it has {len(vertices)}, numbered from 0",
-            "the file is cut short or damaged; write it again",
-        )
-    check_count(name, "triangles", len(faces), POINTS)
+    check_faces(name, faces, len(vertices), "the file is cut short or damaged; write it again")
     return vertices, faces
+
+
+def check_faces(name: str, faces: Array, vertices: int, cure: str) -> None:
+    """Refuse faces (F, 3) that name other vertices than so many, and too many faces."""
+    if len(faces) and not 0 <= faces.min() <= faces.max() < vertices:
+        wrong = faces.min() if faces.min() < 0 else faces.max()
+        raise InputError(f"{name} has a face that names vertex {wrong}; it has {vertices}, numbered from 0", cure)
+    check_count(name, "triangles", len(faces), POINTS)
 
 
 def _joined(parts: Sequence[tuple[FloatArray, Part]]) -> Part:

@@ -1,0 +1,161 @@
+"""Shapes of arrays in memory: checked, turned and placed as those of files are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapeprog.arguments import MOST_SEED, check_number
+from shapeprog.data import placement
+from shapeprog.data.arrays import checked, occupied
+from shapeprog.data.loading import placed
+from shapeprog.data.meshes import check_faces
+from shapeprog.data.reading import ANY_NUMBERS
+from shapeprog.data.shape import Shape
+from shapeprog.errors import InputError
+from shapeprog.language.unit import metres
+from shapeprog.space import Array
+
+
+def shape_from_mesh(
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    *,
+    up: str | None = None,
+    front: str | None = None,
+    name: str = "mesh",
+    points: int = 5000,
+    seed: int = 0,
+    unit: str = "",
+) -> Shape:
+    """The shape of a triangle mesh.
+
+    Parameters
+    ----------
+    vertices, faces
+        Corners (V, 3), and triangles (F, 3) as indices of them.
+    up, front
+        Axes of the vertices such as ``+y`` and ``-z``; by default +y and +z.  ``auto`` up is estimated.
+    name
+        Name of the shape.
+    points, seed
+        How many points to draw from the surface, and the seed.
+    unit
+        Unit of the vertices, such as ``mm``, where it is known.
+
+    Raises
+    ------
+    InputError
+        If an array has another shape or type, a number that is not finite, or a face without its vertices; or if the
+        mesh has no area.
+    ShapeProgError
+        If there is no such unit, or ``points`` or ``seed`` is out of range.
+    """
+    corners, triangles = _numbers("vertices", vertices, 2), _array("faces", faces)
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles) or triangles.dtype.kind not in "iu":
+        cure = "give whole numbers (F, 3); a cloud is read by shape_from_points, and polygons need to be triangles"
+        raise InputError(f"faces is an array of {triangles.dtype} of shape {triangles.shape}", cure)
+    triangles = triangles.astype(np.int64)
+    check_faces(name, triangles, len(corners), "indices count from 0")
+    make = partial(placement.shape_from_mesh, corners, triangles, points=points, seed=seed)
+    return _made(make, name, up, front, points, seed, unit)
+
+
+def shape_from_points(
+    cloud: npt.ArrayLike,
+    *,
+    up: str | None = None,
+    front: str | None = None,
+    name: str = "points",
+    points: int = 5000,
+    seed: int = 0,
+    unit: str = "",
+) -> Shape:
+    """The shape of a point cloud (P, 3) of a surface; inference estimates its normals.
+
+    Parameters
+    ----------
+    cloud
+        Positions (P, 3), at least 100.
+    up, front, name, unit
+        As for :func:`shapeprog.shape_from_mesh`.
+    points, seed
+        How many of the points to keep at most, besides the 20,000 that inference uses, and the seed of that choice.
+
+    Raises
+    ------
+    InputError
+        If the array has another shape or type, a number that is not finite, or too few points.
+    ShapeProgError
+        As for :func:`shapeprog.shape_from_mesh`.
+    """
+    make = partial(placement.shape_from_points, _numbers("cloud", cloud, 2), points=points, seed=seed)
+    return _made(make, name, up, front, points, seed, unit)
+
+
+def shape_from_voxels(
+    voxels: npt.ArrayLike,
+    *,
+    up: str | None = None,
+    front: str | None = None,
+    name: str = "voxels",
+    unit: str = "",
+) -> Shape:
+    """The shape of a voxel grid (R, R, R) of booleans, or of 0 and 1.
+
+    Parameters
+    ----------
+    voxels
+        Occupied cells.  Inference works best where the solid is filled.
+    up, front
+        Axes of the array such as ``+y`` and ``-z``; by default those of the grid: up, to the rear, left.
+    name
+        Name of the shape.
+    unit
+        Unit of the side of a cell, where it is known.
+
+    Raises
+    ------
+    InputError
+        If the array has another shape or other values, or no cell is occupied.
+    ShapeProgError
+        If there is no such unit.
+    """
+    cells = occupied(_numbers("voxels", voxels, 3), "voxels").copy()  # the shape keeps them
+    return _made(partial(placement.shape_from_voxels, cells), name, up, front, 1, 0, unit, cloud=False)
+
+
+def _made(
+    make: Callable[..., Shape], name: str, up: str | None, front: str | None, points: int, seed: int, unit: str,
+    cloud: bool = True,
+) -> Shape:  # fmt: skip
+    """The shape in its axes, which by default are those of an array in a file, and of a mesh those of a cloud."""
+    check_number("points", points, 1, whole=True)
+    check_number("seed", seed, 0, MOST_SEED, whole=True)
+    if unit:
+        metres(unit)
+    return replace(placed(Path(f"{name}.npy"), up, front, partial(make, name=name), cloud), unit=unit)
+
+
+def _array(name: str, value: Any) -> Array:
+    try:
+        return np.asarray(value)
+    except Exception as error:  # ragged lists, tensors with gradients or on a GPU
+        raise InputError(f"{name} is no array: {error}", "give an array of NumPy") from error
+
+
+@ANY_NUMBERS
+def _numbers(name: str, value: Any, dimensions: int) -> Array:
+    """Points (P, 3) in float64, or a grid (R, R, R)."""
+    array = _array(name, value)
+    if array.ndim != dimensions:
+        wanted = "(P, 3)" if dimensions == 2 else "(R, R, R)"
+        raise InputError(f"{name} is an array of shape {array.shape}", f"give the shape {wanted}")
+    numbers = checked(array, name)
+    return numbers if dimensions == 2 else numbers[0]

@@ -1,0 +1,77 @@
+"""Shapes of arrays in memory are those of the files that hold the same arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+import shapeprog as sp
+
+pytestmark = pytest.mark.wrong_types
+
+BOX = trimesh.creation.box((4, 2, 1))
+VERTICES, FACES = np.asarray(BOX.vertices), np.asarray(BOX.faces)
+CLOUD = np.random.default_rng(0).random((300, 3))
+CELLS = np.zeros((8, 8, 8), np.uint8)
+CELLS[1:7, 2:4, 3:5] = 1
+
+
+def assert_equal(shape: sp.Shape, other: sp.Shape) -> None:
+    for each in fields(sp.Shape):
+        np.testing.assert_array_equal(getattr(shape, each.name), getattr(other, each.name), each.name)
+
+
+@pytest.mark.parametrize("axes", [{}, {"up": "-x"}, {"up": "+z", "front": "+x"}, {"up": "auto"}])
+def test_a_shape_of_arrays_is_that_of_the_file_with_them(tmp_path: Path, axes: dict[str, str]) -> None:
+    BOX.export(tmp_path / "a.ply")
+    np.save(tmp_path / "cloud.npy", CLOUD)
+    np.save(tmp_path / "cells.npy", CELLS)
+    kept = {"points": 200, "seed": 3, "unit": "mm"}
+    for made, file in [
+        (sp.shape_from_mesh(VERTICES, FACES.tolist(), name="a", **kept, **axes), "a.ply"),
+        (sp.shape_from_points(torch.from_numpy(CLOUD), name="cloud", **kept, **axes), "cloud.npy"),
+        (sp.shape_from_voxels(CELLS.astype(bool), name="cells", unit="mm", **axes), "cells.npy"),
+    ]:
+        assert_equal(made, replace(sp.load_shape(tmp_path / file, **kept, **axes), source=None))
+
+
+def test_a_shape_of_voxels_keeps_them_when_the_array_changes() -> None:
+    cells = np.zeros((32, 32, 32), np.bool_)
+    cells[4:28, 10:22, 10:22] = True
+    shape = sp.shape_from_voxels(cells)
+    cells[:] = False
+    assert shape.voxels.sum() == 24 * 12 * 12
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: sp.shape_from_mesh(VERTICES[:, :2], FACES), r"vertices holds an array of shape \(8, 2\)"),
+        (lambda: sp.shape_from_mesh(VERTICES * np.nan, FACES), "mesh: 8 of 8 positions are not finite numbers"),
+        (lambda: sp.shape_from_mesh(VERTICES.astype(str), FACES), "vertices holds <U"),
+        (lambda: sp.shape_from_mesh(VERTICES, FACES + 1), "names vertex 8; it has 8, numbered from 0"),
+        (lambda: sp.shape_from_mesh(VERTICES, FACES * 1.0), "faces is an array of float64"),
+        (lambda: sp.shape_from_mesh(VERTICES, FACES[:0]), r"of shape \(0, 3\)\n  hint: .* shape_from_points"),
+        (lambda: sp.shape_from_mesh(VERTICES, FACES, up="w"), "'w' is not an axis"),
+        (lambda: sp.shape_from_mesh(VERTICES, FACES, unit="foot"), "foot"),
+        (lambda: sp.shape_from_mesh(VERTICES, FACES, points=0), "points is 0"),
+        (lambda: sp.shape_from_points([[1, 2, 3], [1, 2]]), "cloud is no array: .*\n  hint: give an array of NumPy"),
+        (lambda: sp.shape_from_points(torch.ones(200, 3, requires_grad=True)), "cloud is no array: .*requires grad"),
+        (lambda: sp.shape_from_points(CELLS), r"of shape \(8, 8, 8\)\n  hint: give the shape \(P, 3\)"),
+        (lambda: sp.shape_from_points(CLOUD[:99]), "99 points"),
+        (lambda: sp.shape_from_voxels(CELLS * 0.5), "holds voxels with the value 0.5"),
+        (lambda: sp.shape_from_voxels(CELLS[:7]), r"voxels holds an array of shape \(7, 8, 8\)"),
+        (lambda: sp.shape_from_voxels(CELLS[None]), r"\(1, 8, 8, 8\)\n  hint: give the shape \(R, R, R\)"),
+        (lambda: sp.shape_from_voxels(CELLS * 0), "occupied"),
+    ],
+)
+def test_wrong_arrays_are_refused(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises(sp.ShapeProgError, match=message):
+        call()

@@ -75,3 +75,37 @@ def test_a_shape_of_voxels_keeps_them_when_the_array_changes() -> None:
 def test_wrong_arrays_are_refused(call: Callable[[], Any], message: str) -> None:
     with pytest.raises(sp.ShapeProgError, match=message):
         call()
+
+
+GRID = np.ones((32, 32, 32), np.bool_)
+GRID_POINTS, TRIANGLE = np.zeros((5, 3), np.float32), np.array([[0, 1, 2]], np.int32)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: sp.Shape("a", torch.from_numpy(GRID)), "voxels of a shape is no array of NumPy but Tensor"),
+        (
+            lambda: sp.Shape("a", GRID[:8]),
+            r"bool of the shape \(8, 32, 32\)\n  hint: give bool_? of the shape \(32, 32",
+        ),
+        (lambda: sp.Shape("a", GRID * 1), r"voxels of a shape is int64 of .*\n.* shape_from_voxels"),
+        (lambda: sp.Shape("a", GRID, GRID_POINTS[:, :2]), r"\(5, 2\)\n  hint: give float32 of the shape \(..., 3\)"),
+        (lambda: sp.Shape("a", GRID, GRID_POINTS.astype(np.float64)), "points of a shape is float64"),
+        (lambda: sp.Shape("a", GRID, GRID_POINTS / 0), "not finite"),
+        (lambda: sp.Shape("a", GRID, scan=GRID_POINTS[0]), r"scan of a shape is float32 of the shape \(3,\)"),
+        (lambda: sp.Shape("a", GRID, vertices=GRID_POINTS), "both vertices and faces"),
+        (lambda: sp.Shape("a", GRID, vertices=GRID_POINTS, faces=TRIANGLE + 3), "names vertex 5; it has 5"),
+        (lambda: sp.infer(CLOUD), r"ndarray is neither a shape nor the path of one\n  hint: arrays become shapes"),
+        (lambda: sp.infer(torch.from_numpy(CLOUD)), "Tensor is neither a shape nor the path"),
+        (lambda: sp.infer(None), "NoneType is neither"),
+        (lambda: sp.refine(sp.parse("box(at=(0, 0, 0), size=(2, 2, 2))"), CLOUD), "ndarray is neither"),
+        (lambda: sp.evaluate(sp.parse("box(at=(0, 0, 0), size=(2, 2, 2))"), CLOUD), "ndarray is neither"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_a_shape_with_wrong_arrays_is_refused_and_so_are_arrays_instead_of_a_shape(
+    call: Callable[[], Any], message: str
+) -> None:
+    with pytest.raises(sp.InputError, match=message):
+        call()

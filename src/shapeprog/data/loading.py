@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.data.folders import Skipped, files_below
 from shapeprog.data.meshes import COMMON, mesh_formats, read_mesh
 from shapeprog.data.orientation import AUTO, axes_of, default_axes, in_shapenet_layout
@@ -61,10 +62,12 @@ def load(
     InputError
         If there is no such file, or it cannot be read as a shape.
     ShapeProgError
-        If there is no such unit.
+        If there is no such unit, or ``points`` or ``seed`` is out of range.
     """
     if unit:
         metres(unit)
+    check_number("points", points, 1, whole=True)
+    check_number("seed", seed, 0, MOST_SEED, whole=True)
     file, index = _split_index(path)
     held = _open(file, up, front, points, seed)
     if index is None and len(held) != 1:
@@ -75,6 +78,11 @@ def load(
 
 
 load_shape = load  # its name in ``shapeprog``, whose ``load`` reads programs
+
+
+def loaded(shape: Shape | str | os.PathLike[str]) -> Shape:
+    """A shape as it is, or the one in a file."""
+    return shape if isinstance(shape, Shape) else load(shape)
 
 
 def load_in_axes(path: str | os.PathLike[str], frame: Frame | None, *, points: int = 5000, seed: int = 0) -> Shape:
@@ -244,6 +252,9 @@ def _open_array(path: Path, name: str, make_shape: Place, points: int, seed: int
 
 
 def _split_index(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
+    if not isinstance(path, str | os.PathLike):
+        cure = "arrays become shapes by shape_from_mesh, shape_from_points or shape_from_voxels"
+        raise InputError(f"{type(path).__name__} is neither a shape nor the path of one", cure)
     whole_path = Path(path)
     text = os.fspath(path)
     if os.path.exists(whole_path) or "#" not in text:

@@ -9,16 +9,23 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.data.meshes import check_faces
+from shapeprog.errors import InputError
 from shapeprog.language.unit import MOST_METRES, assumed_unit
-from shapeprog.space import SPAN, Frame
+from shapeprog.space import RESOLUTION, SPAN, Array, Frame
 
 IN_METRES, IN_MILLIMETRES = (".glb", ".gltf"), (".stl", ".3mf")
 """Suffixes of formats whose unit is the metre by definition, and the millimetre by convention."""
+
+_CURE = "make the shape with shape_from_mesh, shape_from_points or shape_from_voxels"
 
 
 @dataclass(frozen=True)
 class Shape:
     """A shape in the grid frame: centred, its longest side 24 cells, axes up, depth and left-right.
+
+    :func:`shapeprog.load_shape` makes it from a file, :func:`shapeprog.shape_from_mesh` and its neighbours from arrays
+    in any coordinates.  An array of another shape or type, or with numbers that are not finite, is an ``InputError``.
 
     Parameters
     ----------
@@ -59,6 +66,16 @@ class Shape:
     note: str = ""
     unit: str = ""
 
+    def __post_init__(self) -> None:
+        _check("voxels", self.voxels, np.bool_, (RESOLUTION,) * 3)
+        for name, kind in (("points", np.float32), ("scan", np.float32), ("vertices", np.float32), ("faces", np.int32)):
+            if (array := getattr(self, name)) is not None:
+                _check(name, array, kind, (*np.shape(array)[:1], 3))
+        if (self.vertices is None) != (self.faces is None):
+            raise InputError("a mesh has both vertices and faces, or neither", _CURE)
+        if self.vertices is not None and self.faces is not None:
+            check_faces(self.name, self.faces, len(self.vertices), "indices count from 0")
+
     @property
     def file_unit(self) -> str:
         """The unit of its file that was named, that of the format, or one assumed where the shape would be more than
@@ -77,3 +94,14 @@ class Shape:
     @property
     def _suffix(self) -> str:
         return "" if self.source is None else self.source.suffix.lower()
+
+
+def _check(name: str, array: Array, kind: type[np.generic], shape: tuple[int, ...]) -> None:
+    """Refuse anything but a finite array of a kind and a shape."""
+    if not isinstance(array, np.ndarray):
+        raise InputError(f"{name} of a shape is no array of NumPy but {type(array).__name__}", _CURE)
+    if array.dtype != kind or array.shape != shape:
+        wanted = f"{kind.__name__} of the shape {'(..., 3)' if len(shape) == 2 else shape}"
+        raise InputError(f"{name} of a shape is {array.dtype} of the shape {array.shape}", f"give {wanted}, or {_CURE}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} of a shape holds numbers that are not finite", "remove or mend them")

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Literal
 
 from shapeprog.arguments import MOST_SEED, check_number
-from shapeprog.data.loading import load
+from shapeprog.data import Shape, loaded
 from shapeprog.data.remarks import doubt_of_furniture, remark_on_pieces, remark_on_size
-from shapeprog.data.shape import Shape
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats.format import CELLS
 from shapeprog.formats.samples import occupied
@@ -161,7 +160,7 @@ def infer(
     check_number("seed", seed, 0, MOST_SEED, whole=True)
     if statements not in ("all", "paper"):
         raise ShapeProgError(f"unknown statements {statements!r}", "choose all or paper")
-    target = shape if isinstance(shape, Shape) else load(shape)
+    target = loaded(shape)
     prepare_kernels(cells=statements == "paper" or target.points is None)
     started = time.monotonic()
     searching, refining = (Deadline(started + share * budget) for share in (SEARCH_SHARE, 1.0))

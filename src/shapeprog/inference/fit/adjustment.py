@@ -10,7 +10,7 @@ import math
 
 import torch
 
-from shapeprog.data.shape import Shape
+from shapeprog.data import Shape, loaded
 from shapeprog.geometry.arrays import one_thread
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.fit.joints import Joints, find_joints, joining, moved, needs
@@ -22,7 +22,7 @@ from shapeprog.inference.surface.settings import SURFACE
 from shapeprog.language.program import Program
 
 
-def refine(program: Program, shape: Shape, *, seed: int = 0) -> Program:
+def refine(program: Program, shape: Shape | str, *, seed: int = 0) -> Program:
     """The same program with continuous numbers that fit a shape: those of hundredths of cells and tenths of degrees.
 
     Parameters
@@ -30,11 +30,11 @@ def refine(program: Program, shape: Shape, *, seed: int = 0) -> Program:
     program
         A program in cells whose surface is within a cell or two of that of the shape.
     shape
-        A mesh, a point cloud or voxels.
+        A mesh, a point cloud or voxels, or the path of such a file.
     seed
         Of the samples that each step draws.
     """
-    return adjust(program, evidence_of(shape), seed=seed)
+    return adjust(program, evidence_of(loaded(shape)), seed=seed)
 
 
 def adjust(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import torch
@@ -57,6 +58,19 @@ def test_shortest_decimals_are_exact(value: float) -> None:
     assert to_float32(float(text)) == value
     assert math.copysign(1, float(text)) == math.copysign(1, value)
     assert len(text) <= len(repr(value)) + 4
+
+
+def test_a_program_that_was_set_reads_back_with_its_text_in_a_grid_of_its_own(tmp_path: Path) -> None:
+    parsed = parse("width, depth, height = 60, 40, 80\nleg(left=0, width=4, height=height - 5)\n")
+    assert parse(format_program(parsed)) == parsed
+    frame, changed = sp.Frame(2.0, (1.0, 2.0, 3.0)), sp.set(parsed, height=120)
+    save(changed, tmp_path / "a.shape", frame)
+    again, own = sp.load_with_frame(tmp_path / "a.shape")
+    assert again != changed
+    assert format_program(again) == format_program(changed)
+    assert own is not None
+    before, after = (place.to_world(sp.unroll(each).centre) for each, place in ((changed, frame), (again, own)))
+    torch.testing.assert_close(before, after, atol=1e-5, rtol=0)
 
 
 def test_numbers_are_printed_as_people_write_them() -> None:

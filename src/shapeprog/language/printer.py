@@ -1,7 +1,9 @@
 """Canonical program text.
 
-Every float32 survives: ``parse(format_program(program)) == program`` for all finite numbers, negative zero and
-negative lengths included (which draw nothing); counts and turns are whole.
+Every float32 survives, negative zero and negative lengths included (which draw nothing); counts and turns are whole.
+``parse(format_program(program)) == program`` for programs that were parsed and for statements in cells.  Placed parts
+that were inferred or set to other numbers keep a scale that their text does not hold: they read back with the same text
+in the grid of that text, and lie in the same place of the world in the frame with which they are saved.
 """
 
 from __future__ import annotations

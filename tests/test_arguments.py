@@ -13,6 +13,7 @@ import torch
 
 import shapeprog as sp
 from shapeprog.arguments import check_number
+from shapeprog.geometry import losses
 from shapeprog.language.parser import parse
 
 pytestmark = pytest.mark.wrong_types
@@ -44,10 +45,17 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
         (lambda: sp.coverage(SCENES, POINTS.expand(3, 5, 3)), r"do not go with .* \(2,\)\n.* \(2, P, 3\) or \(P, 3\)"),
         (lambda: SCENE.distance(POINTS[:, :2]), r"points has the shape \(5, 2\)"),
         (lambda: sp.chamfer(POINTS.numpy(), POINTS), "cloud is no tensor but ndarray"),
-        (lambda: sp.chamfer(POINTS, POINTS[0]), r"cloud has the shape \(3,\)"),
+        (lambda: sp.chamfer(POINTS, POINTS[0]), r"target has the shape \(3,\)"),
         (lambda: sp.chamfer(POINTS.long(), POINTS), "cloud holds torch.int64"),
         (lambda: sp.chamfer(POINTS, POINTS, weights=torch.ones(4)), r"weights has the shape \(4,\)\n.* the shape 5$"),
         (lambda: sp.chamfer(POINTS, POINTS, target_weights=torch.ones(2, 5)), r"weights has the shape \(2, 5\)"),
+        (lambda: sp.chamfer(POINTS, POINTS * torch.nan), r"target has 5 points .* not finite\n  hint: remove"),
+        (lambda: losses.excess(POINTS, POINTS * torch.inf), "target has 5 points"),
+        (lambda: sp.coverage(SCENE, POINTS.index_fill(0, torch.tensor(1), torch.nan)), "target has 1 points"),
+        (lambda: SCENE.distance(POINTS * torch.nan), "points has 5 points"),
+        (lambda: sp.coverage(PROGRAM, POINTS), r"a Program is given where a scene .*\n  hint: .* sp.unroll\(program\)"),
+        (lambda: sp.sample(PROGRAM, 5), "a Program is given where a scene is needed"),
+        (lambda: sp.sample(CODE, 5), "a Code is given"),
         (lambda: sp.sample(SCENE, -1), "n is -1\n  hint: give a whole number of 0 or more"),
         (lambda: SCENE.sample(2.5), "n is 2.5"),
         (lambda: sp.sample(SCENE, 5, 0), r"generator is 0\n  hint: give torch.Generator\(\)"),

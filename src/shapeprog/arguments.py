@@ -56,3 +56,11 @@ def check_tensor(
         wanted = " x ".join(map(str, ["...", *shape] if lead else shape))
         letters = "" if empty or all(isinstance(one, int) for one in shape) else ", 1 or more of each letter"
         raise ShapeProgError(f"{name} has the shape {sizes}", f"give the shape {wanted}{letters}")
+
+
+def check_finite(name: str, value: Any) -> None:
+    """Raise a ``ShapeProgError`` if a tensor holds numbers that are not finite, for which no distance has a meaning."""
+    if not (finite := value.detach().isfinite()).all():
+        wrong = int((~finite.all(-1)).sum())
+        cure = f"remove them, as {name}[{name}.isfinite().all(-1)] does for one cloud"
+        raise ShapeProgError(f"{name} has {wrong} points whose coordinates are not finite", cure)

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.primitives import primitives
 from shapeprog.lazy_torch import Tensor, torch
 
@@ -101,3 +102,10 @@ class Batch:
 
     def _map(self: Some, change: Callable[[Tensor], Tensor]) -> Some:
         return type(self)(*(change(getattr(self, field.name)) for field in fields(self)))
+
+
+def check_batch(value: object) -> None:
+    """Refuse anything but a batch, such as a program that was not unrolled."""
+    if not isinstance(value, Batch):
+        message = f"a {type(value).__name__} is given where a scene is needed"
+        raise ShapeProgError(message, "unroll makes one of a program, as in sp.unroll(program)")

@@ -18,7 +18,7 @@ from shapeprog.arguments import check_tensor
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import array, first_order, gradients, numbers, over_threads, table_of
-from shapeprog.geometry.batch import Batch
+from shapeprog.geometry.batch import Batch, check_batch
 from shapeprog.geometry.primitive import SIZES
 from shapeprog.geometry.primitives import primitives
 from shapeprog.kernels.table import SIZE, WIDTH
@@ -121,6 +121,7 @@ class _UnionDistance(torch.autograd.Function):
 
 def _aligned(batch: Batch, points: Tensor) -> tuple[Batch, Float[Tensor, "B P 3"]]:
     """Batch and points with one batch dimension."""
+    check_batch(batch)
     check_tensor("points", points, "P", 3)
     given, shape, lead = points.shape[:-2], points.shape[-2:], tuple(batch.batch_shape)
     right = (one in (1, other) for one, other in zip(given[::-1], lead[::-1], strict=False))

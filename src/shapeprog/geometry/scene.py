@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from jaxtyping import Float, Int, UInt8
 
+from shapeprog.arguments import check_finite
 from shapeprog.geometry.batch import Batch
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import RESOLUTION
@@ -29,7 +30,9 @@ class Scene(Batch):
         """Signed distance of points to the union, with gradient; see ``signed_distance``."""
         from shapeprog.geometry.distance import signed_distance
 
-        return signed_distance(self, points)
+        distance = signed_distance(self, points)
+        check_finite("points", points)
+        return distance
 
     def voxels(self, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:
         """The cells that the primitives occupy, 1 or 0; see ``cells.voxels``."""

@@ -25,7 +25,7 @@ from shapeprog.arguments import check_number
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import surface_kernels as kernels
 from shapeprog.geometry.arrays import cast, first_order, gradients, numbers, over_threads, table_of
-from shapeprog.geometry.batch import Batch
+from shapeprog.geometry.batch import Batch, check_batch
 from shapeprog.geometry.distance_kernels import FARTHEST
 from shapeprog.geometry.primitives import primitives
 from shapeprog.kernels.table import WIDTH
@@ -87,8 +87,9 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
     Raises
     ------
     ShapeProgError
-        If an element has no surface, or one that is too large or too far away for single precision.
+        If this is no batch, an element has no surface, or one that is too large or too far away for single precision.
     """
+    check_batch(batch)
     check_number("n", n, 0, whole=True)
     if not isinstance(generator, torch.Generator | None):
         raise ShapeProgError(f"generator is {generator!r}", "give torch.Generator().manual_seed(0), for example")

@@ -33,7 +33,7 @@ GREEDY, REFINED, SEARCH, ALONE = "greedy boxes", "greedy boxes, refined", "searc
 EVERY = "all statements"
 
 COLUMNS = (
-    "iou", "cd", "f1", "noise_floor", "f1_half_percent", "f1_percent", "one_piece", "slivers", "blocks", "statements",
+    "iou", "cd", "f1_cell", "cd_floor", "f1_half_percent", "f1_percent", "one_piece", "slivers", "blocks", "statements",
     "primitives", "numbers", "seconds", "cpu_seconds",
 )  # fmt: skip
 """Measures in the order of the table; normals and outlines need a mesh, which packs do not hold."""
@@ -114,7 +114,7 @@ def table(paths: list[str]) -> str:
             if not len(values):
                 cells.append("-")
                 continue
-            digits = 5 if column in ("cd", "noise_floor") else 3 if column.startswith(("iou", "f1")) else 2
+            digits = 5 if column in ("cd", "cd_floor") else 3 if column.startswith(("iou", "f1")) else 2
             error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
             cells.append(f"{values.mean():.{digits}f} ± {error:.{digits}f} ({np.median(values):.{digits}f})")
         lines.append("| " + " | ".join(cells) + " |")

@@ -463,8 +463,8 @@ def test_evaluate_measures_programs_and_meshes_alike(run: Run, tmp_path: Path, p
         assert ended.code == 0, ended.err
         found[kind] = json.loads(ended.out)["rows"][0]
         assert found[kind]["iou"] > 0.99
-        assert found[kind]["cd"] < 2 * found[kind]["noise_floor"]
-        assert found[kind]["f1"] > 0.95
+        assert found[kind]["cd"] < 2 * found[kind]["cd_floor"]
+        assert found[kind]["f1_cell"] > 0.95
     assert (found["programs"]["blocks"], found["meshes"]["blocks"]) == (2, 0)
     shown = run("evaluate", "programs", "targets")
     assert "CD of the target itself" in shown.out

@@ -36,11 +36,11 @@ def moved(program, up):
     return Program((Draw(top.name, (top.values[0] + up, *top.values[1:])), *program.body[1:]))
 
 
-def test_a_program_against_itself_reads_the_noise_floor(table):
+def test_a_program_against_itself_reads_the_floor_of_the_cd(table):
     row = evaluate_program(TABLE, table, points=2000)
     assert row.iou == 1
-    assert row.f1 > 0.98
-    assert row.cd == pytest.approx(row.noise_floor, rel=0.1)
+    assert row.f1_cell > 0.98
+    assert row.cd == pytest.approx(row.cd_floor, rel=0.1)
     assert (row.blocks, row.statements, row.primitives) == (2, 4, 5)
     assert repr(row) == repr(evaluate_program(TABLE, table, points=2000))  # some measures are not known
     assert row.cd != evaluate_program(TABLE, table, points=2000, seed=1).cd
@@ -61,14 +61,14 @@ def test_distances_are_squared_world_lengths_and_a_cell_is_a_cell(table):
         row = evaluate_program(plate, target, points=10000)
         assert row.to_target == pytest.approx(height**2 / 288, rel=0.02)
         assert row.cd == pytest.approx(row.to_target + row.from_target)
-        assert row.f1 == f1
+        assert row.f1_cell == f1
 
 
 def test_iou_is_of_the_snapped_program_and_cd_of_the_program_as_it_is(table):
     shifted = moved(TABLE, 0.4)
     row = evaluate_program(shifted, table, points=2000)
     assert row.iou == 1
-    assert row.cd > 1.2 * row.noise_floor
+    assert row.cd > 1.2 * row.cd_floor
     assert evaluate_program(TABLE, table, snapped=moved(TABLE, 1.0), points=500).iou < 1
 
 
@@ -76,13 +76,13 @@ def test_targets_without_a_surface_have_an_iou_only(table):
     row = evaluate_program(TABLE, Shape("cells", table.voxels))
     assert row.iou == 1
     assert math.isnan(row.cd)
-    assert math.isnan(row.f1)
+    assert math.isnan(row.f1_cell)
     assert target_samples(Shape("cells", table.voxels), 10, 0) is None
 
 
 def test_a_program_that_draws_nothing_has_the_worst_figures(table):
     row = evaluate_program(Program(()), table, points=200)
-    assert (row.iou, row.f1, row.cd) == (0, 0, math.inf)
+    assert (row.iou, row.f1_cell, row.cd) == (0, 0, math.inf)
     assert row.primitives == 0
 
 

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 _LABELS = {
     "f1_percent": "F1@1%", "f1_percent_floor": "F1@1% of the target itself", "silhouette": "silhouette",
     "one_piece": "one piece", "part_recall": "part recall", "part_precision": "part precision", "cd": "CD",
-    "noise_floor": "CD of the target itself", "numbers": "free numbers", "f1_half_percent": "F1@.5%",
+    "cd_floor": "CD of the target itself", "numbers": "free numbers", "f1_half_percent": "F1@.5%",
     "f1_half_percent_floor": "F1@.5% of the target itself", "normals": "normals",
-    "normals_floor": "normals of the target itself", "slivers": "slivers", "iou": "IoU@32", "f1": "F1@1cell",
+    "normals_floor": "normals of the target itself", "slivers": "slivers", "iou": "IoU@32", "f1_cell": "F1@1cell",
     "blocks": "drawing statements", "statements": "statements", "primitives": "parts",
 }  # fmt: skip
 _MAIN = tuple(_LABELS)[:9]
@@ -246,4 +246,4 @@ def _finite(record: Metrics | Summary) -> dict[str, Any]:
 def _number(name: str, value: Any) -> str:
     if value != value:
         return "-"
-    return f"{value:.5f}" if name in ("cd", "noise_floor") else f"{value:.4g}" if name in _SIZES else f"{value:.3f}"
+    return f"{value:.5f}" if name in ("cd", "cd_floor") else f"{value:.4g}" if name in _SIZES else f"{value:.3f}"

@@ -21,7 +21,7 @@ from shapeprog.inference.infer import Result
 from shapeprog.language.printer import format_program
 
 MEASURES = (
-    "iou", "cd", "noise_floor", "f1_half_percent", "f1_percent", "silhouette", "blocks", "statements", "primitives",
+    "iou", "cd", "cd_floor", "f1_half_percent", "f1_percent", "silhouette", "blocks", "statements", "primitives",
 )  # fmt: skip  # scores of every result
 
 _SUFFIXES = (".json", ".shape", ".glb", ".png")

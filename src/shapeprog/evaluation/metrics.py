@@ -5,7 +5,7 @@ World frame
 CD
     Mean squared distance to the nearest neighbour, prediction to target plus target to prediction, between points
     drawn uniformly by area from the surface of the predicted union and from the target; numbers are not rounded.
-F1
+F1 at one cell
     F-score of the same points at a distance of one grid cell.
 IoU
     Cells of the program, see :mod:`shapeprog.formats.samples`, against the touched cells of the target, at 32^3.
@@ -65,10 +65,10 @@ class Metrics:
     ----------
     name
         Name of the target.
-    cd, to_target, from_target, noise_floor
+    cd, to_target, from_target, cd_floor
         Squared world lengths, for a bounding box with diagonal 1.
-    f1
-        Share between 0 and 1.
+    f1_cell
+        F-score at a distance of one cell, between 0 and 1; that of the shares of the diagonal is ``f1_percent``.
     iou
         Share between 0 and 1, of the cells of the program, see :func:`shapeprog.formats.samples.occupied`.
     blocks, statements, primitives
@@ -91,8 +91,8 @@ class Metrics:
     cd: float
     to_target: float
     from_target: float
-    noise_floor: float
-    f1: float
+    cd_floor: float
+    f1_cell: float
     iou: float
     blocks: int
     statements: int
@@ -162,7 +162,7 @@ def evaluate_program(
     to_target, from_target, f1, floor = distances(sampled, target, points, seed)
     row = Metrics(
         name=target.name, cd=to_target + from_target, to_target=to_target, from_target=from_target,
-        noise_floor=floor, f1=f1, iou=iou, blocks=program.blocks, statements=program.statements,
+        cd_floor=floor, f1_cell=f1, iou=iou, blocks=program.blocks, statements=program.statements,
         primitives=int(scene.mask.sum()), numbers=numbers(program),
     )  # fmt: skip
     if not looks:
@@ -251,7 +251,7 @@ def target_samples(target: Shape, points: int, seed: int) -> tuple[Cloud, Cloud]
     """Two independent samplings of the surface of a target, or None where it is known as cells only.
 
     From a mesh both have ``points`` points.  Otherwise they are two halves of the points at hand, each of at most
-    ``points``: with fewer than twice as many at hand the noise floor reads too high.
+    ``points``: with fewer than twice as many at hand the floor of the CD reads too high.
     """
     mesh = _mesh(target)
     if mesh is not None:
@@ -265,9 +265,10 @@ def target_samples(target: Shape, points: int, seed: int) -> tuple[Cloud, Cloud]
 
 
 def distances(sampled: Cloud | None, target: Shape, points: int, seed: int) -> tuple[float, float, float, float]:
-    """Prediction to target, target to prediction, F1, and noise floor; not a number for a target of cells alone.
+    """Prediction to target, target to prediction, F1 at one cell, and the floor of the CD.
 
-    ``sampled`` are points on the surface of the prediction, ``None`` if it has no surface.
+    All are not a number for a target of cells alone.  ``sampled`` are points on the surface of the prediction, ``None``
+    if it has no surface.
     """
     samples = target_samples(target, points, seed)
     if samples is None:

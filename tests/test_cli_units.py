@@ -13,8 +13,8 @@ import trimesh
 from commands import FRAME, PROGRAM, Run, table
 
 from shapeprog import inference
+from shapeprog.data.shape import unit_of_result
 from shapeprog.formats import export, load, load_with_frame
-from shapeprog.inference.infer import unit_of_result
 from shapeprog.language.convert import placed
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.free import numbers

@@ -14,13 +14,12 @@ from hypothesis import strategies as st
 
 from shapeprog.data.loading import load_shape
 from shapeprog.data.random import random_program
-from shapeprog.data.shape import Shape
+from shapeprog.data.shape import Shape, unit_of_result
 from shapeprog.errors import ShapeProgError
 from shapeprog.formats import export, load_with_frame, save
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.inference import Settings, infer
 from shapeprog.inference.choice.connecting import floating
-from shapeprog.inference.infer import unit_of_result
 from shapeprog.language.convert import placed
 from shapeprog.language.named import names
 from shapeprog.language.parser import parse

@@ -23,11 +23,21 @@ def number_of(value: Any, *, whole: bool = False) -> float:
 
 
 def check_number(
-    name: str, value: Any, least: float, most: float = math.inf, *, whole: bool = False, above: bool = False
+    name: str,
+    value: Any,
+    least: float,
+    most: float = math.inf,
+    *,
+    whole: bool = False,
+    above: bool = False,
+    endless: bool = False,
 ) -> None:
-    """Raise a ``ShapeProgError`` unless a value is a finite number from ``least``, or ``above`` it, to ``most``."""
+    """Raise a ``ShapeProgError`` unless a value is a number from ``least``, or ``above`` it, to ``most``.
+
+    It is finite, unless it may be ``endless``.
+    """
     number = number_of(value, whole=whole)
-    if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
+    if not ((endless or math.isfinite(number)) and least <= number <= most) or (above and number == least):
         bounds = f"above {least:g}" if above else f"of {least:g} or more"
         bounds += f", at most {most:g}" if most < math.inf else ""
         raise ShapeProgError(f"{name} is {value!r}", f"give a {'whole ' if whole else ''}number {bounds}")

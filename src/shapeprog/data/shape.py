@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from shapeprog.data.meshes import check_faces
 from shapeprog.errors import InputError
-from shapeprog.language.unit import MOST_METRES, assumed_unit
+from shapeprog.formats.format import CELLS
+from shapeprog.language.program import Program
+from shapeprog.language.unit import MOST_METRES, Unit, assumed_unit, metres
 from shapeprog.space import RESOLUTION, SPAN, Array, Frame
 
 IN_METRES, IN_MILLIMETRES = (".glb", ".gltf"), (".stl", ".3mf")
@@ -94,6 +96,24 @@ class Shape:
     @property
     def _suffix(self) -> str:
         return "" if self.source is None else self.source.suffix.lower()
+
+
+def check_unit(name: str) -> None:
+    """Raise a ``ShapeProgError`` unless a name is empty, ``cells``, or that of a unit."""
+    if name not in ("", CELLS):
+        metres(name)
+
+
+def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | None:
+    """The unit in which a program that was inferred from a shape is written, by its name, or ``cells``.
+
+    Without a name it is that of the file, which may have none.  Voxels are then left in cells unless somebody has named
+    the unit of the file.  Statements in cells have no unit.
+    """
+    plain_voxels = shape.kind == "voxels" and not (name or shape.unit)
+    if name == CELLS or plain_voxels or program.scale is None:
+        return None
+    return Unit.of(shape.frame, name, shape.file_unit) if name else Unit(shape.file_unit, shape.frame.scale)
 
 
 def _check(name: str, array: Array, kind: type[np.generic], shape: tuple[int, ...]) -> None:

@@ -19,8 +19,8 @@ from typing import Literal
 from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.data import Shape, loaded
 from shapeprog.data.remarks import doubt_of_furniture, remark_on_pieces, remark_on_size
+from shapeprog.data.shape import check_unit, unit_of_result
 from shapeprog.errors import ShapeProgError
-from shapeprog.formats.format import CELLS
 from shapeprog.formats.samples import occupied
 from shapeprog.geometry.arrays import one_thread
 from shapeprog.geometry.cells import iou, pack
@@ -41,7 +41,6 @@ from shapeprog.language.free import numbers
 from shapeprog.language.merging import merged
 from shapeprog.language.program import Program
 from shapeprog.language.readable import in_readable_unit
-from shapeprog.language.unit import Unit, metres
 from shapeprog.language.unroll import unroll
 from shapeprog.library import Library, joined, with_library
 
@@ -153,11 +152,14 @@ def infer(
     ShapeProgError
         If there is no such unit, or another argument has no meaning.
     """
-    if unit not in ("", CELLS):
-        metres(unit)
+    check_unit(unit)
     check_number("blocks", blocks, 0, whole=True)
     check_number("detail", detail, 0, above=True)
     check_number("seed", seed, 0, MOST_SEED, whole=True)
+    check_number("budget", budget, 0, endless=True)
+    if not isinstance(settings, Settings | None):
+        raise ShapeProgError(f"settings is {settings!r}", "give Settings(), or nothing")
+    library = joined(libraries)
     if statements not in ("all", "paper"):
         raise ShapeProgError(f"unknown statements {statements!r}", "choose all or paper")
     target = loaded(shape)
@@ -186,7 +188,7 @@ def infer(
         final = program if snapped is None else named_anew(program)
         held = frozenset[int]()
         if libraries:
-            final, held = with_calls(final, joined(libraries), coverage)
+            final, held = with_calls(final, library, coverage)
         if ties:
             if progress:
                 progress("tying numbers", 0.0)
@@ -200,7 +202,7 @@ def infer(
             tunable = Tunable(program)
             program = tunable.settled(tunable.values)
         if libraries:
-            program = with_library(program, joined(libraries))
+            program = with_library(program, library)
     program = in_readable_unit(program, unit_of_result(target, program, unit))
     front = note_on_front(program, target.frame) if target.points is not None and statements == "all" else ""
     size = remark_on_size(unroll(program), evidence.surface) if target.points is not None else ""
@@ -225,15 +227,3 @@ def prepare_kernels(*, cells: bool = False) -> None:
     call on a machine takes seconds, the first in a process a fraction of one.
     """
     prepare(modules_of(*SURFACE_KERNELS, *(CELL_KERNELS if cells else ())))
-
-
-def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | None:
-    """The unit in which a program that was inferred from a shape is written, by its name, or ``cells``.
-
-    Without a name it is that of the file, which may have none.  Voxels are then left in cells unless somebody has named
-    the unit of the file.  Statements in cells have no unit.
-    """
-    plain_voxels = shape.kind == "voxels" and not (name or shape.unit)
-    if name == CELLS or plain_voxels or program.scale is None:
-        return None
-    return Unit.of(shape.frame, name, shape.file_unit) if name else Unit(shape.file_unit, shape.frame.scale)

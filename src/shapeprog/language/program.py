@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterator
+import reprlib
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Any
 
+from shapeprog.errors import ShapeProgError
 from shapeprog.language.ast import Draw as Draw
 from shapeprog.language.ast import Loop as Loop
 from shapeprog.language.ast import Scale, Source, changed_lines, changed_values
@@ -95,6 +98,15 @@ class Program:
     def snap(self) -> Program:
         """The program with every number rounded half to even to a whole one, as published executors do."""
         return Program(changed_lines(self.body, partial(changed_values, change=lambda value: float(round(value)))))
+
+
+def programs_of(value: Any) -> list[Program]:
+    """One program, or several, as a list; a ``ShapeProgError`` if anything else is among them."""
+    programs: list[Program] = list(value) if isinstance(value, Iterable) else [value]
+    if not all(isinstance(program, Program) for program in programs):
+        cure = "read text with parse, and a file with load; a result of infer holds one as .program"
+        raise ShapeProgError(f"{reprlib.repr(value)} is no program, and no list of programs", cure)
+    return programs
 
 
 def nest(chain: Chain) -> Node:

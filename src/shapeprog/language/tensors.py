@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import reprlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from shapeprog.errors import ShapeProgError
-from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
+from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest, programs_of
 from shapeprog.language.statement import EMPTY, END, SLOTS, language
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import Array
@@ -54,10 +53,7 @@ def encode(
     longest program has, or as are asked for.  There are as many slots as the longest statement takes, at least the
     published seven.  A ``ShapeProgError`` if a program has more blocks, or a statement that is not declared so.
     """
-    batch = list(programs) if isinstance(programs, Iterable) else [programs]
-    if not all(isinstance(program, Program) for program in batch):
-        message = f"{reprlib.repr(programs)} is no program, and no list of programs"
-        raise ShapeProgError(message, "read text with parse, and a file with load")
+    batch = programs_of(programs)
     chains = [program.chains for program in batch]
     needed = max([0, *map(len, chains)])
     steps = max([PUBLISHED_DEPTH, *(len(chain) for program in chains for chain in program)])

@@ -14,12 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shapeprog.arguments import check_number
 from shapeprog.language.ast import Assignment, Call, Comment, Function, Line, Source
 from shapeprog.language.convert import in_cells, placed_function, placed_if_possible
 from shapeprog.language.evaluate import evaluated, placed_source
 from shapeprog.language.placement import BOX_IN_CELLS, SIZES
 from shapeprog.language.printer import format_source, source_of
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, programs_of
 from shapeprog.library.blocks import Block, Kind
 from shapeprog.library.groups import LEAST_PROGRAMS, NEAR, Candidate, Corpus, Unit, candidates, statement_of, units_of
 from shapeprog.library.length import statements
@@ -49,9 +50,11 @@ class Learned(NamedTuple):
 def learn(given: Iterable[Program], most: int = MOST) -> Library:
     """The library of the functions that shorten programs most; empty if none does.  The same for the same programs.
 
-    Comments show how often the programs use each function, and a typical call.
+    Comments show how often the programs use each function, and a typical call.  A ``ShapeProgError`` if ``given``
+    are no programs, or ``most`` is no number.
     """
-    given = list(given)
+    check_number("most", most, 0, whole=True)
+    given = programs_of(given)
     results = list(_functions([in_cells(program) for program in given], most))
     if not results:
         return Library(Source())

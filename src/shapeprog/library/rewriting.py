@@ -24,11 +24,11 @@ from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Expression, rounded
 from shapeprog.language.merging import merged_lines, separate_loops
 from shapeprog.language.printer import source_of
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, programs_of
 from shapeprog.library.blocks import ROWS
 from shapeprog.library.length import length, statements, written
 from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, forms
-from shapeprog.library.store import Library
+from shapeprog.library.store import Library, check_library
 
 
 def with_library(program: Program, library: Library) -> Program:
@@ -40,6 +40,8 @@ def with_library(program: Program, library: Library) -> Program:
     stay in their unit.  A program with statements that have no placed form does not change, nor does one whose numbers
     are not linear in its names.
     """
+    check_library(library)
+    programs_of([program])
     try:
         original = placed(program)
         cells = named_cells(original)

@@ -78,6 +78,13 @@ class Library:
         return tuple(Pattern(self.source, function, self.examples.get(function.name)) for function in self.functions)
 
 
+def check_library(value: object) -> None:
+    """Raise a ``ShapeProgError`` unless a value is a library."""
+    if not isinstance(value, Library):
+        cure = "load_library reads one from a file, and learn makes one from programs"
+        raise ShapeProgError(f"a {type(value).__name__} is given where a library is needed", cure)
+
+
 def load_library(path: str | os.PathLike[str] | None = None) -> Library:
     """The library in a program file that holds functions alone; without a path the one that ships.
 
@@ -117,7 +124,10 @@ def joined(libraries: Iterable[Library]) -> Library:
     Of several with one name the first counts; functions that call another one of this name are left out.
     """
     result = Source()
+    if isinstance(libraries, Library | str | os.PathLike):
+        raise ShapeProgError("libraries is no list", "give a list of libraries, such as [load_library()]")
     for library in libraries:
+        check_library(library)
         dropped: set[str] = set()
         lines: list[Line] = []
         for line in library.source.lines:
@@ -135,6 +145,7 @@ def joined(libraries: Iterable[Library]) -> Library:
 
 def save_library(library: Library, path: str | os.PathLike[str]) -> Path:
     """Write a library as program text, and return the path."""
+    check_library(library)
     file = Path(path)
     if not library.functions:
         raise OutputError(

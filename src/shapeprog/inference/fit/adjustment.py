@@ -19,21 +19,30 @@ from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, programs_of
 
 
 def refine(program: Program, shape: Shape | str, *, seed: int = 0) -> Program:
-    """The same program with continuous numbers that fit a shape: those of hundredths of cells and tenths of degrees.
+    """The same statements and loops with numbers that fit a shape, in hundredths of cells and tenths of degrees.
+
+    It is written out in cells: names, expressions, functions and comments are lost, as by :func:`shapeprog.inline`.  To
+    fit named numbers, use :class:`shapeprog.Parametric`.
 
     Parameters
     ----------
     program
-        A program in cells whose surface is within a cell or two of that of the shape.
+        A program whose surface, in the grid of the shape, is within a cell or two of that of the shape.
     shape
         A mesh, a point cloud or voxels, or the path of such a file.
     seed
         Of the samples that each step draws.
+
+    Raises
+    ------
+    ShapeProgError
+        If an argument is of the wrong kind.
     """
+    programs_of([program])
     return adjust(program, evidence_of(loaded(shape)), seed=seed)
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from shapeprog.language.statement import _try, standard
+from shapeprog.language.statement import standard
+from shapeprog.language.trial import check_declaration
 
 PROGRAM = """width, depth, height = 9, 10, 24
 n = 3
@@ -113,4 +114,4 @@ with on_numpy(True):
 
 def test_declarations_that_ship_pass_the_trial_that_those_of_users_do() -> None:
     for declared in standard:
-        _try(declared)
+        check_declaration(declared)

@@ -12,159 +12,27 @@ from __future__ import annotations
 
 import inspect
 import keyword
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from itertools import count
 from typing import Any, get_type_hints
 
-import numpy as np
-from jaxtyping import Float
-
 from shapeprog.arguments import number_of
 from shapeprog.errors import DeclarationError, ShapeProgError
-from shapeprog.geometry.batch import Solids
-from shapeprog.geometry.primitive import SIZES
-from shapeprog.language.hints import Box
+from shapeprog.language.declaration import Hint
+from shapeprog.language.declaration import Motion as Motion
+from shapeprog.language.declaration import Role as Role
+from shapeprog.language.declaration import Statement as Statement
 from shapeprog.language.parameters import Parameter, Quantity
-from shapeprog.lazy_torch import Tensor, torch
+from shapeprog.language.trial import check_declaration
+from shapeprog.lazy_torch import Tensor
 
 SLOTS = 7  # in published tensors for the parameters of one statement
 MOST_SLOTS = 16  # tensors are as wide as the statements at hand need, up to here
 EMPTY, END = 0, 21  # ids without a statement: nothing, and the end of a loop in flat listings
 ROLES = 127  # ids of roles that are no statements lie above
-
-Hint = Callable[[Box], Iterable[Sequence[float]]]
-
-
-@dataclass(frozen=True)
-class Motion:
-    """How a loop moves one copy: reflections, a turn or a rotation about the pivot, then a shift in cells.
-
-    The reflections are -1 or 1 for each axis of the grid, about the planes through its origin.  The turn is about the
-    vertical axis, as a fraction of a full circle from depth towards left-right; it is exact at quarters.  The default
-    pivot is that of the statement.
-    """
-
-    turn: Float[Tensor, "*batch"] | None = None
-    rotation: Float[Tensor, "*batch 3 3"] | None = None
-    pivot: Float[Tensor, "*batch 3"] | None = None
-    shift: Float[Tensor, "*batch 3"] | None = None
-    signs: Float[Tensor, "*batch 3"] | None = None
-
-
-@dataclass(frozen=True)
-class Role:
-    """The purpose of a part, whatever its solid: ``leg(taper(...))`` and ``leg(bar(...))`` are both legs.
-
-    Parameters
-    ----------
-    name, id, doc
-        Word in program text, number in tensors, one line of manual.  A role may share them with a statement, which then
-        brings its solid along: ``leg(at=..., size=...)`` is a leg, too.
-    label
-        What data sets of labelled parts call it; empty if they have no word for it.
-    """
-
-    name: str
-    id: int
-    doc: str
-    label: str = ""
-
-
-@dataclass(frozen=True)
-class Statement:
-    """The declaration of a statement that draws, or of a loop.
-
-    Parameters
-    ----------
-    name, id, doc, parameters, paper
-        Word in program text, number in tensors, one line of manual, and named parameters in slot order; names in the
-        notation of the paper, such as ``("Leg", "Cub")``.
-    draw, move
-        The function of a drawing statement from parameter tensors by name to one or more :class:`Solids`; or of a loop
-        ``(copy index, quarter, **parameters) -> Motion``.
-    pivot, quarter
-        Parameter tensors by name to a point (..., 3) on the vertical axis about which rotation loops turn what the
-        statement draws, by default that of the grid; whether they do so by quarter turns instead of evenly.
-    taught
-        Whether synthetic furniture draws it, so that generators learn it.
-    hint
-        Starting values of inference for an oriented box that its solid fills about; none where it would not.
-    """
-
-    name: str
-    id: int
-    doc: str
-    parameters: tuple[Parameter, ...]
-    draw: Callable[..., Solids | Sequence[Solids]] | None = None
-    move: Callable[..., Motion] | None = None
-    pivot: Callable[..., Float[Tensor, "*batch 3"]] | None = None
-    quarter: bool = False
-    paper: tuple[str, str] | None = None
-    taught: bool = True
-    hint: Hint | None = None
-
-    @property
-    def is_loop(self) -> bool:
-        """Whether it repeats its body instead of drawing."""
-        return self.move is not None
-
-    @property
-    def ships(self) -> bool:
-        """Whether it comes with the package: it is known to work, on NumPy arrays as on tensors."""
-        functions = (function for function in (self.draw, self.move, self.pivot) if function is not None)
-        return all(function.__module__.startswith("shapeprog.") for function in functions)
-
-    @property
-    def size(self) -> int:
-        """Number of tensor slots in use."""
-        return sum(parameter.quantity.width for parameter in self.parameters)
-
-    @cached_property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """Quantity of every slot in use, in order."""
-        return tuple(p.quantity for p in self.parameters for _ in range(p.quantity.width))
-
-    def call(self, numbers: Sequence[str]) -> str:
-        """How it is written with these numbers, in slot order; the first argument of a loop has no keyword."""
-        words = [p.call(numbers[p.slots]) for p in self.parameters if not p.silent(numbers[p.slots])]
-        if self.is_loop:
-            words[0] = words[0].removeprefix(f"{self.first.name}=")
-        return f"{self.name}({', '.join(words)})"
-
-    def written(self, values: Sequence[float]) -> int:
-        """How many continuous numbers text writes for these values."""
-        shown = (p for p in self.parameters if not p.quantity.discrete)
-        return sum(p.quantity.width for p in shown if p.unsaid is None or values[p.start] != p.unsaid)
-
-    @property
-    def first(self) -> Parameter:
-        """The first parameter that is written."""
-        return next(parameter for parameter in self.parameters if parameter.quantity.written_out)
-
-    @property
-    def signature(self) -> str:
-        """How it is written, with a blank for each number that it leaves open; loops begin with ``for i in``."""
-        call = self.call([quantity.blank for quantity in self.quantities])
-        return f"for i in {call}:" if self.is_loop else call
-
-    def split(self, values: Float[Tensor, "*batch slots"]) -> dict[str, Tensor]:
-        """Parameter tensors by name: (...) for one slot, (..., width) for several; turns and counts are rounded."""
-        named = {}
-        for parameter in self.parameters:
-            part = values[..., parameter.slots if parameter.quantity.width > 1 else parameter.start]
-            named[parameter.name] = part.detach().round() if parameter.quantity.discrete else part
-        return named
-
-    def solids(self, values: Float[Tensor, "*batch slots"]) -> list[Solids]:
-        """What the statement draws for parameters, of which it takes the first, before any loop."""
-        assert self.draw is not None
-        result = self.draw(**self.split(values))
-        return [result] if isinstance(result, Solids) else list(result)
-
 
 WORDS = "use letters, digits and underscores"
 
@@ -187,7 +55,7 @@ class Language:
         for message, hint in self._faults(declared):
             raise DeclarationError(message, hint)
         if not declared.ships:
-            _try(declared)
+            check_declaration(declared)
         self._by_id = dict(sorted({**self._by_id, declared.id: declared}.items()))
         self._by_name[declared.name] = declared
         return declared
@@ -362,39 +230,3 @@ def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], 
     return registry.register(
         Statement(name, registry.free_id() if id is None else id, line, tuple(parameters), **fields)
     )
-
-
-def _try(declared: Statement) -> None:
-    """Draw or move once with mid-range parameters, so that a wrong shape is refused now and not amid a run."""
-    values = torch.tensor([(quantity.low + quantity.high) / 2 for quantity in declared.quantities]).repeat(2, 1)
-    parts: list[tuple[Tensor | None, tuple[int, ...]]] = []  # with their shapes
-    try:
-        if declared.move is not None:
-            motion = declared.move(torch.arange(2.0), torch.zeros(2, dtype=torch.bool), **declared.split(values))
-            parts += [(motion.turn, (2,)), (motion.rotation, (2, 3, 3))]
-            parts += [(part, (2, 3)) for part in (motion.pivot, motion.shift, motion.signs)]
-            what = f"loop {declared.name!r} returns a motion"
-            requirement = "a turn must be (...), a rotation (..., 3, 3), a pivot, a shift and signs (..., 3)"
-        else:
-            for numbers, lead in ((values, (2,)), (values[0], ())):
-                for solids in declared.solids(numbers):
-                    parts += [(solids.size, (*lead, SIZES)), (solids.centre, (*lead, 3))]
-            if parts and declared.pivot is not None:
-                parts.append((declared.pivot(**declared.split(values)), (2, 3)))
-            what = f"statement {declared.name!r} returns solids"
-            requirement = "sizes must be (..., 4), centres and a pivot (..., 3)"
-        shapes = [part if part is None else tuple(part.shape) for part, _ in parts]
-    except Exception as cause:
-        message = f"statement {declared.name!r} cannot be {'moved' if declared.is_loop else 'drawn'}: {cause}"
-        hint = "its function gets one tensor (...) or (..., width) per parameter, with any leading dimensions or none"
-        raise DeclarationError(message, hint) from cause
-    if not parts or any(shape not in (None, right) for shape, (_, right) in zip(shapes, parts, strict=True)):
-        requirement += " with the leading dimensions of the parameters"
-        raise DeclarationError(f"{what} of shapes {shapes}", requirement)
-    what, box = f"the hint of statement {declared.name!r}", Box(np.zeros(3), np.eye(3), np.array([6.0, 1.0, 1.0]))
-    try:
-        counts = {len(start) for start in declared.hint(box)} - {declared.size} if declared.hint else set()
-    except Exception as cause:
-        raise DeclarationError(f"{what} fails: {cause}", "it gets a box and returns lists of numbers") from cause
-    if counts:
-        raise DeclarationError(f"{what} yields {min(counts)} numbers", f"yield {declared.size}, one for each parameter")

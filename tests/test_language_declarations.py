@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,14 +13,17 @@ from declared import MODULES
 
 from shapeprog.data.random import random_program
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
+from shapeprog.formats.cuts import cut_list
 from shapeprog.formats.plugins import load_statements
 from shapeprog.geometry import Solids
+from shapeprog.inference.choice.connecting import floating
 from shapeprog.language import Language, decode, encode, loop, standard, statement, unroll, using
 from shapeprog.language.parameters import Axis, Count, Extent, Length, Position, Quantity, Shift3, Two
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.shapes import box
 from shapeprog.language.statement import Motion
+from shapeprog.space import Frame
 from shapeprog.view.manual import manual
 
 
@@ -258,6 +262,49 @@ def test_failing_modules_leave_nothing(empty: Language, tmp_path: Path, code: st
     assert empty.names == []
     path.write_text(CRATE)
     assert [declared.name for declared in load_statements(path)] == ["crate"]
+
+
+def test_an_edited_module_replaces_its_declarations_and_a_broken_one_leaves_them(
+    empty: Language, tmp_path: Path
+) -> None:
+    path = tmp_path / "crates.py"
+    path.write_text(CRATE + 'from shapeprog.language import role\nrole("box_of_a_kind", "A box.")\n')
+    (first,) = load_statements(path)
+    path.write_text(CRATE.replace("at, size)\n", "at, 2 * size)\n") + CRATE.replace("crate", "chest"))
+    second, chest = load_statements(path)
+    assert ([*empty], [*empty.roles], second.id) == ([second, chest], [], first.id)
+    assert float(unroll(parse("crate(at=(0, 0, 0), size=(1, 1, 1))")).size.max()) == 1
+    path.write_text("1 / 0")
+    with pytest.raises(DeclarationError, match="ZeroDivisionError"):
+        load_statements(path)
+    assert [*empty] == [second, chest]
+
+
+def cell(code: str, number: int) -> None:
+    """Run a cell of a notebook."""
+    exec(compile(code, f"<cell {number}>", "exec"), {"__name__": "__main__"})
+
+
+def test_a_cell_of_a_notebook_replaces_its_declaration() -> None:
+    with using(copy.deepcopy(standard)) as own:
+        declared = CRATE + 'from shapeprog.language import role\nrole("crate", "A crate.")\n'
+        cell(declared, 1)
+        number = own["crate"].id
+        part = parse("crate(at=(0, 0, 0), size=(4, 4, 4))")
+        assert cut_list(part, Frame()).cuts[0][0].length == 4
+        assert not floating(part)
+        cell(declared, 1)  # run again
+        cell(declared.replace("return box(at, size)", "return [box(at, size / 2), box(at + size, size / 8)]"), 2)
+        assert own["crate"].id == number == own.roles["crate"].id
+        assert cut_list(part, Frame()).cuts[0][0].length == 2
+        assert floating(part)
+        with pytest.raises(DeclarationError, match="no docstring"):
+            cell(declared.replace('"""A crate."""', ""), 3)
+        assert len(unroll(part).mask) == 2
+        with pytest.raises(DeclarationError, match="'leg' is declared twice"):
+            cell(CRATE.replace('"crate"', '"leg"'), 4)
+        with pytest.raises(DeclarationError, match="role 'crate' is declared twice"):
+            cell('from shapeprog.language import role\nrole("crate", "Another crate.")\n', 5)
 
 
 def test_missing_modules_are_named(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import io
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from shapeprog.formats.frames import placement
 from shapeprog.geometry.mesh import solids_of
 from shapeprog.geometry.primitives import primitives
 from shapeprog.language.program import Program
+from shapeprog.language.statement import remembered
 from shapeprog.language.unit import METRES
 from shapeprog.language.unroll import exact_scene
 from shapeprog.space import FloatArray, Frame
@@ -101,7 +102,7 @@ class CutList(NamedTuple):
         return [same] * (self.coinciding > 0) + [thin] * (self.dropped > 0)
 
 
-@lru_cache(maxsize=1)  # the command writes and prints the same list
+@remembered(1)  # the command writes and prints the same list
 def cut_list(program: Program, frame: Frame, unit: str = "") -> CutList:
     """The distinct parts of a program; ``frame.scale`` is the size of a cell in ``unit``, which is empty if unknown."""
     with exact_scene(program) as scene:

@@ -5,20 +5,31 @@ from __future__ import annotations
 import os
 import runpy
 import traceback
+from copy import copy
 from pathlib import Path
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 from shapeprog.errors import DeclarationError, InputError, ShapeProgError
 from shapeprog.language.statement import Language, Statement, language
 
-_loaded: WeakKeyDictionary[Language, dict[Path, tuple[Statement, ...]]] = WeakKeyDictionary()
+
+class _Module(NamedTuple):
+    """A file that was loaded: its content then, and what it declared."""
+
+    content: bytes
+    declared: tuple[Statement, ...]
+    roles: tuple[str, ...]
+
+
+_loaded: WeakKeyDictionary[Language, dict[Path, _Module]] = WeakKeyDictionary()
 
 
 def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     """Run a module of declarations and return the statements and loops that it declares.
 
     The module is trusted: it is executed as Python.  If it fails, none of its declarations remain.  Loading a file
-    again in the same language has no effect.
+    again in the same language has no effect, unless it was edited: its declarations are then replaced.
 
     Raises
     ------
@@ -29,25 +40,31 @@ def load_statements(path: str | os.PathLike[str]) -> tuple[Statement, ...]:
     """
     file = Path(path).resolve()
     loaded = _loaded.setdefault(language(), {})
-    if file in loaded:
-        return loaded[file]
     if not file.is_file():
         result = "a folder" if file.is_dir() else "no file"
         raise InputError(f"{path} is {result}", "give the path of a Python file that declares statements")
+    content, old = file.read_bytes(), loaded.get(file)
+    if old is not None and old.content == content:
+        return old.declared
     registry = vars(language())
-    before = {table: dict(entries) for table, entries in registry.items()}
-    known, roles = set(language().names), len(language().roles)
+    before = {table: copy(entries) for table, entries in registry.items()}
+    for declaration in old.declared if old else ():
+        language().forget(declaration.name)
+    for role in old.roles if old else ():
+        del language().roles[role]
+    known, roles = set(language().names), {*language().roles}
     try:
         runpy.run_path(str(file), run_name=f"shapeprog_statements_{len(loaded)}_{file.stem}")
         declared = tuple(declaration for declaration in language() if declaration.name not in known)
-        if not declared and len(language().roles) == roles:
+        own = tuple(role for role in language().roles if role not in roles)
+        if not declared and not own:
             raise DeclarationError(f"{path} declares no statement", "decorate a function with @statement or @loop")
     except BaseException as cause:
         registry.update(before)
         if isinstance(cause, (Exception, SystemExit)):
             raise _in_words(path, file, cause) from cause
         raise
-    loaded[file] = declared
+    loaded[file] = _Module(content, declared, own)
     return declared
 
 

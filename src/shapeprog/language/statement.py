@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import inspect
 import keyword
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
+from functools import lru_cache, wraps
 from itertools import count
-from typing import Any, get_type_hints
+from typing import Any, ParamSpec, TypeVar, get_type_hints
 
 from shapeprog.arguments import number_of
 from shapeprog.errors import DeclarationError, ShapeProgError
@@ -42,29 +44,54 @@ def is_word(name: str) -> bool:
     return name.isidentifier() and not keyword.iskeyword(name)
 
 
+_versions = count()
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
 class Language:
     """A registry of statements and loops, found by name or by id, and of roles."""
 
     def __init__(self) -> None:
+        self.version = next(_versions)  # another one after each declaration, and in every other language
         self._by_id: dict[int, Statement] = {}
         self._by_name: dict[str, Statement] = {}
         self.roles: dict[str, Role] = {}
 
-    def register(self, declared: Statement) -> Statement:
-        """Add a declaration and return it; a ``DeclarationError`` if its name or id is taken or it does not fit."""
-        for message, hint in self._faults(declared):
+    def register(self, declared: Statement, replaced: Statement | None = None) -> Statement:
+        """Add a declaration, in the place of one of the same name if given, and return it.
+
+        A ``DeclarationError`` if its name or id is taken or it does not fit.
+        """
+        for message, hint in self._faults(declared, replaced):
             raise DeclarationError(message, hint)
         if not declared.ships:
             check_declaration(declared)
-        self._by_id = dict(sorted({**self._by_id, declared.id: declared}.items()))
+        others = {number: known for number, known in self._by_id.items() if known is not replaced}
+        self._by_id = dict(sorted({**others, declared.id: declared}.items()))
         self._by_name[declared.name] = declared
+        self.version = next(_versions)
         return declared
 
+    def earlier(self, name: str, function: Callable[..., Any]) -> Statement | None:
+        """The declaration of a user that a function replaces: of the same lines run again, or of a cell of a notebook.
+
+        Cells and lines typed at a prompt are in no file.
+        """
+        old = self._by_name.get(name)
+        codes = [getattr(each, "__code__", None) for each in (old and (old.draw or old.move), function)]
+        if old is None or old.ships or None in codes:
+            return None
+        places = {(code.co_filename, code.co_firstlineno) for code in codes if code}
+        return old if len(places) == 1 or not any(os.path.exists(file) for file, _ in places) else None
+
     def add_role(self, name: str, doc: str, label: str = "") -> Role:
-        """Add a role and return it; a ``DeclarationError`` if there is one, or a loop, of this name.
+        """Add a role and return it; a ``DeclarationError`` if there is another one, or a loop, of this name.
 
         It has the id of the statement of its name, which brings its solid along, or else one above all others.
         """
+        if name in self.roles and (self.roles[name].doc, self.roles[name].label) == (doc, label):
+            return self.roles[name]  # a cell that is run again
         if name in self.roles:
             raise DeclarationError(f"role {name!r} is declared twice", "give one of them another name")
         if not is_word(name):
@@ -98,11 +125,13 @@ class Language:
         """What parts are called by a word: a role, or a statement that is none."""
         return self.roles[word] if word in self.roles else self._by_name[word]
 
-    def _faults(self, declared: Statement) -> Iterator[tuple[str, str]]:
+    def _faults(self, declared: Statement, replaced: Statement | None) -> Iterator[tuple[str, str]]:
         """The mistakes in a declaration, found without drawing it, each with its cure."""
+        others = [known for known in self if known is not replaced]
         what = f"statement {declared.name!r}"
-        owners = dict.fromkeys((EMPTY, END), "the language itself") | {known.id: known.name for known in self}
-        owners = {role.id: f"the role {role.name}" for role in self.roles.values()} | owners
+        owners = dict.fromkeys((EMPTY, END), "the language itself") | {known.id: known.name for known in others}
+        roles = [role for role in self.roles.values() if replaced is None or role.name != replaced.name]
+        owners = {role.id: f"the role {role.name}" for role in roles} | owners
         if not is_word(declared.name):
             yield f"{declared.name!r} is not a Python identifier", WORDS
         if declared.is_loop and [p.quantity.kind for p in declared.parameters][:1] != ["count"]:
@@ -116,12 +145,12 @@ class Language:
             yield f"{what} has {limit}", "use fewer or narrower parameters"
         if any(quantity.low > quantity.high for quantity in declared.quantities):
             yield f"a range of {what} ends before it starts", "swap low and high"
-        if declared.name in self._by_name:
+        if declared.name in self._by_name and replaced is None:
             yield f"{what} is declared twice", "give one of them another name"
         if declared.id in owners:
             free = f"leave the id out; the next free one is {self.free_id()}"
             yield f"{what} wants id {declared.id}, which belongs to {owners[declared.id]}", free
-        for twin in self:
+        for twin in others:
             if declared.paper and twin.paper == declared.paper:
                 cure = "leave it out; the notation then uses the statement's own name"
                 yield f"{what} has the paper's name {declared.paper}, which belongs to {twin.name}", cure
@@ -129,6 +158,7 @@ class Language:
     def forget(self, name: str) -> None:
         """Take a declaration out again."""
         del self._by_id[self._by_name.pop(name).id]
+        self.version = next(_versions)
 
     def free_id(self) -> int:
         """The smallest id above those of the paper that is not taken."""
@@ -171,6 +201,21 @@ def using(other: Language) -> Iterator[Language]:
         _active.reset(token)
 
 
+def remembered(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Keep the results of so many calls of a function of programs, until a statement is declared anew."""
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        cached = lru_cache(most)(lambda version, args, named: function(*args, **dict(named)))
+
+        @wraps(function)
+        def call(*args: P.args, **named: P.kwargs) -> R:
+            return cached(language().version, args, tuple(named.items()))
+
+        return call
+
+    return decorate
+
+
 def role(name: str, doc: str, label: str = "") -> Role:
     """Declare a role in the language in force, see :meth:`Language.add_role`."""
     return language().add_role(name, doc, label)
@@ -190,6 +235,7 @@ def statement(
     """Declare a drawing statement from a function of annotated parameters that returns its solids.
 
     Without ``doc`` the manual shows the first paragraph of the function's docstring; :class:`Statement` has the rest.
+    A cell of a notebook that is run again, or another one that declares the same name, replaces the declaration.
     """
     fields = {"pivot": pivot, "quarter": quarter, "paper": paper, "taught": taught, "hint": hint}
     return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, **fields)
@@ -227,6 +273,7 @@ def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], 
     if not doc:
         raise DeclarationError(f"statement {name!r} has no docstring", "describe it in one line")
     registry, line = language(), " ".join(doc.split("\n\n")[0].split())
-    return registry.register(
-        Statement(name, registry.free_id() if id is None else id, line, tuple(parameters), **fields)
-    )
+    replaced = registry.earlier(name, function)
+    if id is None:
+        id = registry.free_id() if replaced is None else replaced.id
+    return registry.register(Statement(name, id, line, tuple(parameters), **fields), replaced)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from torch import Tensor
 from shapeprog.geometry.batch import Solids
 from shapeprog.geometry.primitives import primitives
 from shapeprog.language.program import Chain, Draw, Loop, Program
-from shapeprog.language.statement import Statement, language
+from shapeprog.language.statement import Statement, language, remembered
 from shapeprog.language.unroll import unroll
 from shapeprog.space import DEPTH, HALF, SIDE, SPAN, UP, FloatArray
 
@@ -235,7 +235,7 @@ def _repeated(
     return _Repeated(repeats, steps is not None, stacked, (*counts, *(steps[1:] if steps else ())))
 
 
-@lru_cache(1024)
+@remembered(1024)
 def _is_symmetric_part(draw: Draw, axis: int) -> bool:
     """Whether a part defined by points is its own mirror image across the plane through all of them."""
     indices = [k for k, slot in enumerate(_slots(language()[draw.name])) if slot == (slot.word, "position", axis)]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from functools import lru_cache
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.choice.settings import SETTINGS
 from shapeprog.language.hints import Box
 from shapeprog.language.program import Chain, Node, Program
+from shapeprog.language.statement import remembered
 from shapeprog.language.unroll import unroll
 
 
@@ -48,7 +48,7 @@ def floating(program: Program) -> list[int]:
     return sorted({block for block, lone in _loose_parts(program) if lone})
 
 
-@lru_cache(maxsize=64)
+@remembered(64)
 def _loose_parts(program: Program) -> list[tuple[int, bool]]:
     """The block of every part, and whether that is outside the largest connected solid."""
     scene = unroll(program)

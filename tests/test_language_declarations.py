@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pytest
 import torch
 from declared import MODULES
@@ -116,6 +117,31 @@ def nothing(at: Position) -> list[Solids]:
     return []
 
 
+def forgotten(at: Position, size: Extent) -> Solids:
+    """Has no return."""
+    box(at, size)
+
+
+def no_solids(at: Position, size: Extent) -> list[torch.Tensor]:
+    """Returns tensors."""
+    return [at, size]
+
+
+def detached(at: Position, size: Extent) -> Solids:
+    """Has a gradient to its position alone."""
+    return box(at, size.detach())
+
+
+def through_numpy(at: Position, size: Extent) -> Solids:
+    """Takes square roots with NumPy."""
+    return box(at, torch.from_numpy(np.sqrt(size.numpy())))
+
+
+def unused(at: Position, size: Extent, edge: Length) -> Solids:
+    """Does nothing with its edge."""
+    return box(at, size)
+
+
 def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solids:
     """A range from 4 to 2."""
     return box(at, at)
@@ -138,6 +164,11 @@ def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solid
         ("crate", {}, no_single, "cannot be drawn: too many indices"),
         ("crate", {}, failing, "cannot be drawn: index 5"),
         ("crate", {}, nothing, "solids of shapes"),
+        ("crate", {}, forgotten, "cannot be drawn: it returns nothing, not Solids|Type-check error"),
+        ("crate", {}, no_solids, "cannot be drawn: it returns Tensor, not Solids|Type-check error"),
+        ("crate", {}, detached, "returns solids without a gradient to size\n.* compute with torch alone"),
+        ("crate", {}, through_numpy, "cannot be drawn: Can't call numpy.*\n.* compute with torch alone"),
+        ("crate", {}, unused, "without a gradient to edge\n  hint: use every parameter"),
         ("crate", {}, backwards, "ends before it starts"),
         ("crate", {}, part_of_a_copy, "wrong default of 'n': n of crate is 2.5, but must be whole"),
         ("crate", {}, no_axis, "wrong default of .* not an axis"),
@@ -174,6 +205,11 @@ def absent(copy: torch.Tensor, quarter: torch.Tensor, count: Count) -> None:
     """Returns nothing."""
 
 
+def stiff(copy: torch.Tensor, quarter: torch.Tensor, count: Count, by: Shift3) -> Motion:
+    """Shifts without a gradient."""
+    return Motion(shift=copy[..., None] * by.detach())
+
+
 def thrice(copy: torch.Tensor, quarter: torch.Tensor, count: Count = 3) -> Motion:  # type: ignore[assignment]
     """Text could leave its count out."""
     return Motion()
@@ -199,7 +235,8 @@ def off(copy: torch.Tensor, quarter: torch.Tensor, count: Count) -> Motion:
     [
         (still, "no count"),
         (flat, "a motion of shapes|Type-check error"),
-        (absent, "cannot be moved"),
+        (absent, "cannot be moved: it returns nothing, not Motion|Type-check error"),
+        (stiff, "returns a motion without a gradient to by"),
         (thrice, "needs a first argument without a default"),
         (twice, "needs a first argument"),
         (bent, "a motion of shapes|Type-check error"),

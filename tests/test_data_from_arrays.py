@@ -42,6 +42,12 @@ def test_a_shape_of_arrays_is_that_of_the_file_with_them(tmp_path: Path, axes: d
         assert_equal(made, replace(sp.load_shape(tmp_path / file, **kept, **axes), source=None))
 
 
+def test_a_shape_is_shown_in_one_line() -> None:
+    shape = sp.shape_from_mesh(VERTICES, FACES, name="box", unit="cm")
+    assert repr(shape) == "<Shape 'box': mesh, 5,000 points, 12 faces, 1,728 cells, longest side 4 cm>"
+    assert repr(sp.shape_from_voxels(CELLS)) == "<Shape 'voxels': voxels, 1,536 cells, longest side 6>"
+
+
 def test_a_shape_of_voxels_keeps_them_when_the_array_changes() -> None:
     cells = np.zeros((32, 32, 32), np.bool_)
     cells[4:28, 10:22, 10:22] = True

@@ -230,7 +230,10 @@ def test_the_same_programs_give_the_same_library_and_it_comes_back_from_its_file
     found = learn(programs)
     assert found.functions
     assert learn(program for program in programs) == found
+    assert repr(found).startswith(f"<Library of {len(found.functions)}: {found.functions[0].name}")
+    assert "\n" not in repr(found)
     assert load_library(save_library(found, tmp_path / "a.shape")) == found
+    assert (tmp_path / "a.shape").read_text() == f"{found}\n"
     with pytest.raises(OutputError, match="no place for a library"):
         save_library(found, tmp_path / "a.json")
 

@@ -22,7 +22,7 @@ IN_METRES, IN_MILLIMETRES = (".glb", ".gltf"), (".stl", ".3mf")
 _CURE = "make the shape with shape_from_mesh, shape_from_points or shape_from_voxels"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Shape:
     """A shape in the grid frame: centred, its longest side 24 cells, axes up, depth and left-right.
 
@@ -77,6 +77,13 @@ class Shape:
             raise InputError("a mesh has both vertices and faces, or neither", _CURE)
         if self.vertices is not None and self.faces is not None:
             check_faces(self.name, self.faces, len(self.vertices), "indices count from 0")
+
+    def __repr__(self) -> str:
+        """Its name and kind, how much it holds, and its longest side in the world, in one line."""
+        counts = {"points": self.points, "faces": self.faces}
+        held = [f"{len(array):,} {name}" for name, array in counts.items() if array is not None]
+        size = f"longest side {SPAN * self.frame.scale:.4g} {self.file_unit}".rstrip()
+        return f"<Shape {self.name!r}: {', '.join([self.kind, *held, f'{self.voxels.sum():,} cells', size])}>"
 
     @property
     def file_unit(self) -> str:

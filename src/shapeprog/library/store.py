@@ -22,7 +22,7 @@ DEFAULT = Path(__file__).parent / "furniture.shape"
 """The library that ships."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Library:
     """Functions that programs may call.
 
@@ -33,6 +33,14 @@ class Library:
     """
 
     source: Source
+
+    def __str__(self) -> str:
+        """Its text: each function with the comments above it."""
+        return format_source(self.source).rstrip("\n")
+
+    def __repr__(self) -> str:
+        """How many functions it has, and their names, in one line."""
+        return f"<Library of {len(self.functions)}: {', '.join(function.name for function in self.functions)}>"
 
     @property
     def functions(self) -> tuple[Function, ...]:

@@ -1,6 +1,6 @@
 from . import liang2022
 from .data.from_arrays import shape_from_mesh, shape_from_points, shape_from_voxels
-from .data.loading import load_shape
+from .data.loading import load_all, load_shape
 from .data.random import random_program
 from .data.shape import Shape
 from .errors import InputError, OutputError, ProgramError, ShapeProgError
@@ -36,7 +36,7 @@ __all__ = [
     "Code", "Draw", "Expression", "Frame", "InputError", "Library", "Linear", "Loop", "Metrics", "Name", "Named",
     "OutputError", "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
     "chamfer", "coverage", "decode", "encode", "evaluate", "evaluated", "export", "format_program", "in_unit",
-    "infer", "inline", "learn", "liang2022", "load", "load_library", "load_shape", "load_statements",
+    "infer", "inline", "learn", "liang2022", "load", "load_all", "load_library", "load_shape", "load_statements",
     "load_with_frame", "loop", "names", "parse", "program_from_json", "program_to_json",
     "random_program", "refine", "sample", "save", "save_library", "set", "shape_from_mesh",
     "shape_from_points", "shape_from_voxels", "statement", "unroll", "with_library",

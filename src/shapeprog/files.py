@@ -176,7 +176,7 @@ def check_file(path: Path) -> None:
     except ValueError as error:  # a zero byte in the name
         raise InputError(f"there is no file {str(path)!r}", "check the path") from error
     if stat.S_ISDIR(kind):
-        raise InputError(f"{path} is a folder", "name a file in it; load_all reads the shapes of a folder")
+        raise InputError(f"{path} is a folder", "name a file in it; in Python sp.load_all reads the shapes of a folder")
     if not stat.S_ISREG(kind):
         raise InputError(f"{path} is a pipe, a socket or a device, no file", "copy its content to a file first")
 

@@ -59,7 +59,7 @@ def shape_from_mesh(
     """
     corners, triangles = _numbers("vertices", vertices, 2), _array("faces", faces)
     if triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles) or triangles.dtype.kind not in "iu":
-        cure = "give whole numbers (F, 3); a cloud is read by shape_from_points, and polygons need to be triangles"
+        cure = "give whole numbers (F, 3); a cloud is read by sp.shape_from_points, and polygons need to be triangles"
         raise InputError(f"faces is an array of {triangles.dtype} of shape {triangles.shape}", cure)
     triangles = triangles.astype(np.int64)
     check_faces(name, triangles, len(corners), "indices count from 0")

@@ -71,7 +71,7 @@ def load(
     file, index = _split_index(path)
     held = _open(file, up, front, points, seed)
     if index is None and len(held) != 1:
-        cure = f"choose one, as in {file.name}#0, or read them all with load_all"
+        cure = f"choose one, as in {file.name}#0, or read them all with sp.load_all"
         raise InputError(f"{file.name} holds {len(held)} shapes", cure)
     number = 0 if index is None else _number(file, index, held)
     return replace(held[number], unit=unit)
@@ -253,7 +253,7 @@ def _open_array(path: Path, name: str, make_shape: Place, points: int, seed: int
 
 def _split_index(path: str | os.PathLike[str]) -> tuple[Path, str | None]:
     if not isinstance(path, str | os.PathLike):
-        cure = "arrays become shapes by shape_from_mesh, shape_from_points or shape_from_voxels"
+        cure = "arrays become shapes by sp.shape_from_mesh, sp.shape_from_points or sp.shape_from_voxels"
         raise InputError(f"{type(path).__name__} is neither a shape nor the path of one", cure)
     whole_path = Path(path)
     text = os.fspath(path)

@@ -19,7 +19,7 @@ from shapeprog.space import RESOLUTION, SPAN, Array, Frame
 IN_METRES, IN_MILLIMETRES = (".glb", ".gltf"), (".stl", ".3mf")
 """Suffixes of formats whose unit is the metre by definition, and the millimetre by convention."""
 
-_CURE = "make the shape with shape_from_mesh, shape_from_points or shape_from_voxels"
+_CURE = "make the shape with sp.shape_from_mesh, sp.shape_from_points or sp.shape_from_voxels"
 
 
 @dataclass(frozen=True, repr=False)

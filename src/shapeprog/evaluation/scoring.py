@@ -75,12 +75,15 @@ def evaluate(
     check_number("seed", seed, 0, MOST_SEED, whole=True)
     program, snapped = getattr(prediction, "program", prediction), getattr(prediction, "snapped", None)
     if not isinstance(program, Program):
-        raise ShapeProgError(f"{prediction!r} is no program", "give a program, or the result of infer")
+        raise ShapeProgError(f"{prediction!r} is no program", "give a program, or the result of sp.infer")
     result = Result(program, frame, snapped)
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
     shape = in_pose_of(result, shape, points, seed)
     if frame is not None and not np.allclose(frame.axes, shape.frame.axes, atol=1e-6):
-        raise InputError("the program has other axes than the target", "make the target with the axes of the frame")
+        raise InputError(
+            "the program has other axes than the target",
+            "load the target with the axes of the frame: up and front of sp.load_shape",
+        )
     return measure(aligned(result, shape), shape, points, seed)
 
 

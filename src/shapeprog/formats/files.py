@@ -88,7 +88,7 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     """
     if Path(path).suffix.lower() not in suffixes("program"):
         endings = " or ".join(suffixes("program"))
-        raise OutputError(f"{path} could not be read back as a program", f"name a {endings} file, or use export")
+        raise OutputError(f"{path} could not be read back as a program", f"name a {endings} file, or use sp.export")
     export(program, path, frame)
 
 

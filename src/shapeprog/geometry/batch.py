@@ -108,4 +108,4 @@ def check_batch(value: object) -> None:
     """Refuse anything but a batch, such as a program that was not unrolled."""
     if not isinstance(value, Batch):
         message = f"a {type(value).__name__} is given where a scene is needed"
-        raise ShapeProgError(message, "unroll makes one of a program, as in sp.unroll(program)")
+        raise ShapeProgError(message, "give sp.unroll(program)")

@@ -158,7 +158,7 @@ def infer(
     check_number("seed", seed, 0, MOST_SEED, whole=True)
     check_number("budget", budget, 0, endless=True)
     if not isinstance(settings, Settings | None):
-        raise ShapeProgError(f"settings is {settings!r}", "give Settings(), or nothing")
+        raise ShapeProgError(f"settings is {settings!r}", "give shapeprog.inference.Settings(), or nothing")
     library = joined(libraries)
     if statements not in ("all", "paper"):
         raise ShapeProgError(f"unknown statements {statements!r}", "choose all or paper")

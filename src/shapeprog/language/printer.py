@@ -46,7 +46,7 @@ def format_program(program: Program) -> str:
     """
     if not isinstance(program, Program):
         message = f"format_program takes one program, not a {type(program).__name__}"
-        raise ShapeProgError(message, "decode returns a list of programs: format each of them")
+        raise ShapeProgError(message, "sp.decode returns a list of programs: format each of them")
     return format_source(source_of(program))
 
 

@@ -104,7 +104,7 @@ def programs_of(value: Any) -> list[Program]:
     """One program, or several, as a list; a ``ShapeProgError`` if anything else is among them."""
     programs: list[Program] = list(value) if isinstance(value, Iterable) else [value]
     if not all(isinstance(program, Program) for program in programs):
-        cure = "read text with parse, and a file with load; a result of infer holds one as .program"
+        cure = "read text with sp.parse, and a file with sp.load; a result of sp.infer holds one as .program"
         raise ShapeProgError(f"{reprlib.repr(value)} is no program, and no list of programs", cure)
     return programs
 

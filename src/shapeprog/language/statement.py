@@ -116,7 +116,10 @@ class Language:
     def declaration(self, name: str, numbers: int) -> Statement:
         """The statement or loop of a name; a ``ShapeProgError`` if there is none with so many numbers."""
         if name not in self:
-            raise ShapeProgError(f"unknown statement {name!r}", "load the module that declares it")
+            raise ShapeProgError(
+                f"unknown statement {name!r}",
+                "load the file that declares it: --with of the commands, sp.load_statements in Python",
+            )
         if numbers != (right := len(self[name].quantities)):
             raise ShapeProgError(f"{name} has {numbers} numbers instead of {right}", "correct the program")
         return self[name]

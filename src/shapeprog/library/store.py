@@ -89,7 +89,7 @@ class Library:
 def check_library(value: object) -> None:
     """Raise a ``ShapeProgError`` unless a value is a library."""
     if not isinstance(value, Library):
-        cure = "load_library reads one from a file, and learn makes one from programs"
+        cure = "sp.load_library reads one from a file, and sp.learn makes one from programs"
         raise ShapeProgError(f"a {type(value).__name__} is given where a library is needed", cure)
 
 
@@ -133,7 +133,7 @@ def joined(libraries: Iterable[Library]) -> Library:
     """
     result = Source()
     if isinstance(libraries, Library | str | os.PathLike):
-        raise ShapeProgError("libraries is no list", "give a list of libraries, such as [load_library()]")
+        raise ShapeProgError("libraries is no list", "give a list of libraries, such as [sp.load_library()]")
     for library in libraries:
         check_library(library)
         dropped: set[str] = set()

@@ -74,9 +74,10 @@ def test_the_blocks_of_the_readme_run_and_infer_the_program_that_it_prints(folde
     assert COMMENT.sub("", printed) == found
     assert COMMENT.sub("", (folder / "demo-output" / "chair_kenney.shape").read_text(encoding="utf-8")) == found
     tutorial = (DOCS / "tutorial.md").read_text(encoding="utf-8")
-    beginning = re.search(r"^```text\n# placed: .*\n((?:.+\n)+?)```$", tutorial, re.MULTILINE)
+    beginning = re.search(r"^```text\n(# placed: .*\n)((?:.+\n)+?)```$", tutorial, re.MULTILINE)
     assert beginning
-    assert found.startswith(beginning[1])
+    assert found.startswith(beginning[2])
+    assert (folder / "demo-output" / "chair_kenney.shape").read_text(encoding="utf-8").startswith(beginning[1])
     replaced = re.findall(r"^sed 's/(.+?)/.+/'", tutorial, re.MULTILINE)
     assert [found.count(each) for each in replaced] == [1]
 
@@ -112,6 +113,16 @@ def test_the_programs_of_a_page_are_programs(page):
             program = sp.parse(f"{WHOLE}\n{code}" if below else code, page.name)
             assert sp.unroll(sp.encode(program)).mask.any()
             assert program.source is None or program.source.warnings == ()
+
+
+def test_the_page_of_formats_shows_the_desk_of_the_language(tmp_path):
+    desk = sp.parse(next(code for language, code in blocks(DOCS / "language.md") if language == "py"))
+    text = (DOCS / "formats.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"^```openscad\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    assert f"\n{script}\n" in sp.export(desk, tmp_path / "desk.scad").read_text(encoding="utf-8")
+    (listed,) = re.findall(r"^```\ncount .*\n((?:.+\n)+)Area", text, re.MULTILINE)
+    rows = sp.export(desk, tmp_path / "desk.csv").read_text(encoding="utf-8").splitlines()[1:]
+    assert [row.split() for row in listed.splitlines()] == [row.replace(",", " ").split() for row in rows]
 
 
 def test_the_page_of_the_language_says_what_the_first_line_of_its_examples_is():

@@ -55,7 +55,7 @@ def test_the_number_of_threads_comes_back_after_an_error():
 
 def test_inference_computes_with_one_thread_of_torch(monkeypatch: pytest.MonkeyPatch):
     module = importlib.import_module("shapeprog.inference.infer")
-    monkeypatch.setattr(module, "load", lambda shape: 1 / (torch.get_num_threads() - 1))
+    monkeypatch.setattr(module, "loaded", lambda shape: 1 / (torch.get_num_threads() - 1))
     with pytest.raises(ZeroDivisionError):
         module.infer("any.obj")
     assert torch.get_num_threads() == 2

@@ -98,6 +98,10 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
         (lambda: sp.with_library(TEXT, sp.load_library()), "is no program"),
         (lambda: sp.save_library(PROGRAM, "a.shape"), "a Program is given where a library is needed"),
         (lambda: sp.refine(TEXT, BENCH), "is no program"),
+        (lambda: sp.random_program("a"), "generator is 'a'\n  hint: give a whole number of 0 or more"),
+        (lambda: sp.random_program(1.5), "generator is 1.5"),
+        (lambda: sp.random_program(0, blocks=-1), "blocks is -1"),
+        (lambda: sp.random_program(0, depth=0), "depth is 0\n  hint: give a whole number of 1 or more"),
         (lambda: sp.infer(BENCH, statements="foo"), "unknown statements 'foo'\n  hint: choose all or paper"),
     ],
 )  # fmt: skip

@@ -12,9 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from commands import PROGRAM, Run, table
 
 from shapeprog import inference
+from shapeprog.cli import terminal
 from shapeprog.cli.terminal import assumed, at
 from shapeprog.errors import ShapeProgError
 from shapeprog.language.named import names as named
@@ -381,3 +383,25 @@ def test_an_empty_program_is_an_error_that_tells_how_programs_begin(
     ended = run(words[0], "t.shape", words[1])
     assert (ended.code, "is empty\nhint: begin with width, depth, height = ..." in ended.err) == (2, True)
     assert not (tmp_path / words[1]).exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (OSError(errno.EACCES, "Permission denied", "in.obj"), "in.obj: Permission denied"),
+        (OSError(errno.ENOSPC, "No space left on device"), "cannot write the standard output: the disk is full"),
+        (OSError(errno.EMFILE, "Too many open files"), "the system: Too many open files"),
+    ],
+)
+def test_an_error_of_the_system_is_called_one_of_writing_only_if_it_is(
+    error: OSError, message: str, monkeypatch: pytest.MonkeyPatch
+):
+    @terminal.guarded
+    def command() -> None:
+        raise error
+
+    told: list[ShapeProgError] = []
+    monkeypatch.setattr(terminal, "complain", told.append)
+    with pytest.raises(typer.Exit):
+        command()
+    assert told[0].message == message

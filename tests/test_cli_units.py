@@ -209,6 +209,9 @@ def test_parts_that_round_to_nothing_are_told(run: Run, tmp_path: Path) -> None:
         (["export", "cm.shape", "a.csv", "--file-unit", "mm"], "the program states its unit, cm"),
         (["export", "cm.shape", "a.shape", "--unit", "m", "--file-unit", "mm"], "the program states its unit, cm"),
         (["export", "cm.shape", "a.glb", "--on-input", "--up", "z"], "give one of them"),
+        (["export", "cm.shape", "a.csv", "--up", "y"], "--up has no effect on .csv"),
+        (["export", "cm.shape", "a.npy", "--up", "y"], "--up has no effect on .npy"),
+        (["export", "cm.shape", "a.json", "--up", "y"], "--up has no effect on .json"),
         (["export", "bad.shape", "a.stl"], "bad.shape, line 2, column 9: unknown unit 'c'"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import io
 import json
@@ -110,12 +111,19 @@ def guarded(command: Command) -> Command:
     return run  # type: ignore[return-value]
 
 
+_OF_OUTPUT = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+"""Errors of writing to a file that is open already, as the standard output is."""
+
+
 def _explained(error: Exception) -> ShapeProgError:
     """The message for an error; raises the error itself if it is a fault of the package."""
     if isinstance(error, ShapeProgError):
         return error
-    if isinstance(error, OSError):
-        return output_error(Path(error.filename or "the standard output"), error)
+    if isinstance(error, OSError) and error.filename is None and error.errno in _OF_OUTPUT:
+        return output_error(Path("the standard output"), error)
+    if isinstance(error, OSError):  # writers name their file
+        subject = "the system" if error.filename is None else error.filename
+        return ShapeProgError(f"{subject}: {error.strerror or error}", "check the path, its permissions and the disk")
     name = (getattr(error, "name", None) or "").partition(".")[0]
     if name in ("", "shapeprog"):
         raise error

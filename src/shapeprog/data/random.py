@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import torch
 
+from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.language.program import PUBLISHED_DEPTH, Chain, Draw, Loop, Program, nest
 from shapeprog.language.statement import Statement, language
 
@@ -35,8 +36,16 @@ def random_program(
         Whether all numbers are whole, as in published programs.
     published
         Whether to stay within the published blocks.
+
+    Raises
+    ------
+    ShapeProgError
+        If the generator is neither a generator nor a seed, or another argument is out of range.
     """
+    for name, number in (("blocks", blocks), ("depth", depth), ("copies", copies)):
+        check_number(name, number, name == "depth", whole=True)
     if not isinstance(generator, torch.Generator):
+        check_number("generator", generator, 0, MOST_SEED, whole=True)
         generator = torch.Generator().manual_seed(generator)
     drawing = [declared for declared in language() if not declared.is_loop]
     loops = [declared for declared in language() if declared.is_loop]

@@ -94,8 +94,10 @@ def placement(
     Raises
     ------
     InputError
-        If the input, the axis or the size of the object is not known, or the file is in cells always.
+        If the input, the axis or the size of the object is not known, or a unit or an axis has no effect on the file.
     """
+    if up and (chosen.axes is None or chosen.unit == CELLS or chosen.kind == "list"):
+        raise InputError(f"--up has no effect on {chosen.suffixes[0]}", "leave it out")
     if chosen.axes is None:
         return Placement(frame)
     if chosen.unit == CELLS:

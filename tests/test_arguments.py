@@ -25,6 +25,7 @@ leg(left=0, width=4, front=0, depth=4, bottom=0, height=seat_bottom)
 seat(bottom=seat_bottom, height=4)
 """
 PROGRAM = parse(TEXT)
+CELLS = parse("box(at=(0, 0, 0), size=(2, 2, 2))")
 CHAIR = sp.Parametric(PROGRAM)
 CODE = sp.encode([PROGRAM])
 SCENE, SCENES = sp.unroll(PROGRAM), sp.unroll([PROGRAM] * 2)
@@ -102,6 +103,11 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
         (lambda: sp.random_program(1.5), "generator is 1.5"),
         (lambda: sp.random_program(0, blocks=-1), "blocks is -1"),
         (lambda: sp.random_program(0, depth=0), "depth is 0\n  hint: give a whole number of 1 or more"),
+        (lambda: sp.infer(BENCH, unit="foot"), "unknown unit 'foot'\n  hint: use mm, cm, m or in$"),
+        (lambda: sp.infer(BENCH, unit=3), "unknown unit 3\n  hint: use mm"),
+        (lambda: sp.in_unit(PROGRAM, "mm"), r"'mm' is the name of a unit\n  hint: give sp.Unit\('mm', n\)"),
+        (lambda: sp.export(CELLS, "a.stl", unit="foot"), "unknown unit 'foot'"),
+        (lambda: sp.export(CELLS, "a.shape", unit="foot"), "unknown unit 'foot'"),
         (lambda: sp.infer(BENCH, statements="foo"), "unknown statements 'foo'\n  hint: choose all or paper"),
     ],
 )  # fmt: skip

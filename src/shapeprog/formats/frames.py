@@ -96,6 +96,8 @@ def placement(
     InputError
         If the input, the axis or the size of the object is not known, or a unit or an axis has no effect on the file.
     """
+    if unit not in ("", CELLS):
+        metres(unit)
     if up and (chosen.axes is None or chosen.unit == CELLS or chosen.kind == "list"):
         raise InputError(f"--up has no effect on {chosen.suffixes[0]}", "leave it out")
     if chosen.axes is None:
@@ -162,6 +164,7 @@ def asked_unit(program: Program, frame: Frame | None, unit: str | None, file_uni
         return program.unit
     if unit == CELLS:
         return None
+    metres(unit)
     per_cell, known = _real_size(program, frame, file_unit)
     if not known:
         in_cells = f"statements in cells have no size: infer the object with --unit {unit}"

@@ -128,8 +128,12 @@ def in_unit(program: Program, unit: Unit | None, workshop: bool = False, digits:
     Raises
     ------
     ShapeProgError
-        If a name is a length in one use, and another number elsewhere, or the program is in cells and has no unit.
+        If a name is a length in one use, and another number elsewhere, the program is in cells and has no unit, or
+        ``unit`` is none.
     """
+    if not isinstance(unit, Unit | None):
+        cure = f"give sp.Unit({unit!r}, n), n being the length of a cell; sp.infer and sp.export take the name alone"
+        raise ShapeProgError(f"{unit!r} is the name of a unit" if unit in METRES else f"{unit!r} is no unit", cure)
     source, unit = source_of(program), unit or Unit("", 1.0)
     if source.unit is None:
         raise ShapeProgError("statements in cells have no unit", "shapeprog tidy places them from sides")

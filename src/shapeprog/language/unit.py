@@ -47,9 +47,9 @@ class Unit:
 
 
 def metres(name: str) -> float:
-    """The metres of a unit; a ``ShapeProgError`` if there is none of this name."""
-    if name not in METRES:
-        raise ShapeProgError(f"unknown unit {name!r}", did_you_mean(name, METRES))
+    """The metres of a unit; a ``ShapeProgError`` if there is none of this name, or it is ``cells``, which have none."""
+    if not isinstance(name, str) or name not in METRES:
+        raise ShapeProgError(f"unknown unit {name!r}", did_you_mean(str(name), METRES, "use mm, cm, m or in"))
     return METRES[name]
 
 

@@ -16,6 +16,7 @@ from shapeprog.inference.fit.adjustment import adjust
 from shapeprog.inference.fit.tunable import THINNEST
 from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.language.parser import parse
+from shapeprog.language.program import Program
 from shapeprog.language.tensors import encode
 from shapeprog.language.unroll import unroll
 
@@ -107,3 +108,15 @@ def test_inference_survives_full_grids_single_cells_and_flat_sheets(kind):
     check(result, 1)
     assert result.scores["iou"] == 1
     assert "the limit of --blocks 1 is reached" in result.reason
+
+
+def test_refinement_writes_names_out():
+    named = parse(
+        "width, depth, height = 40, 30, 60\nthickness = 4\nbody(width=thickness)\ntop(top=0, height=thickness)\n"
+    )
+    inlined = Program(named.body)
+    shape = Shape("planted", cells(named), points(named).numpy())
+    fitted = refine(named, shape)
+    assert fitted.source is None
+    assert fitted == refine(inlined, shape)
+    assert [node.role for node in fitted.walk()] == ["body", "top"]

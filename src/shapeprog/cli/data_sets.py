@@ -156,8 +156,8 @@ def evaluate_command(
     IoU@32          of voxels that are touched; in the statements of the paper of the program rounded, for which
                     evaluate the .json of infer --paper: the .shape holds no rounded form
     CD, F1@1cell    of 5,000 points; Chamfer distance with squared distances, both directions added, diagonal 1
-    ... of the      the same measure between two samplings of the target, or two halves of its points: about what
-    target itself   the best program reads. Halves have fewer points, so CD reads too high, F1 too low
+    ... of the      the same measure between two samplings of the target, or two halves of its points: about the
+    target itself   best value that a program reaches. Halves have fewer points: CD is too high, F1 too low
 
     For --parts DIR, the folder DIR/Chair/bekvam holds the part meshes of the target Chair_bekvam. Parts, predicted
     meshes and predicted point clouds are in the coordinates of the target. A single prediction is compared with a

@@ -13,8 +13,8 @@ Likeness
     F1@.5 %, F1@1 %, normals and silhouette: see :mod:`shapeprog.evaluation.likeness`.  Normals and silhouette need a
     mesh as target; F1 needs points at least.
 Floors
-    CD and likeness between two independent samplings of the target itself, or two halves of its points: about what the
-    best program reads.  For F1 and normals that is a ceiling; halves have fewer points: CD reads too high, F1 too low.
+    CD and likeness between two independent samplings of the target itself, or two halves of its points: about the best
+    value that a program reaches.  Halves have fewer points: their CD is too high, their F1 too low.
 Structure
     Whether the union is one piece, slivers: see :mod:`shapeprog.evaluation.structure`; and continuous numbers, those
     that are free where others follow from names.
@@ -82,7 +82,7 @@ class Metrics:
     slivers
         Share of the primitives that are too thin to be a part.
     f1_half_percent_floor, f1_percent_floor, normals_floor
-        What the target reads against itself, sampled twice.
+        The same between two samplings of the target.
     part_recall, part_precision
         Parts that one primitive covers, over parts and over primitives: see :mod:`shapeprog.evaluation.parts`.
     """
@@ -251,7 +251,7 @@ def target_samples(target: Shape, points: int, seed: int) -> tuple[Cloud, Cloud]
     """Two independent samplings of the surface of a target, or None where it is known as cells only.
 
     From a mesh both have ``points`` points.  Otherwise they are two halves of the points at hand, each of at most
-    ``points``: with fewer than twice as many at hand the floor of the CD reads too high.
+    ``points``: with fewer than twice as many at hand the floor of the CD is too high.
     """
     mesh = _mesh(target)
     if mesh is not None:

@@ -23,19 +23,11 @@ def number_of(value: Any, *, whole: bool = False) -> float:
 
 
 def check_number(
-    name: str,
-    value: Any,
-    least: float,
-    most: float = math.inf,
-    *,
-    whole: bool = False,
-    above: bool = False,
+    name: str, value: Any, least: float, most: float = math.inf, *, whole: bool = False, above: bool = False,
     endless: bool = False,
-) -> None:
-    """Raise a ``ShapeProgError`` unless a value is a number from ``least``, or ``above`` it, to ``most``.
-
-    It is finite, unless it may be ``endless``.
-    """
+) -> None:  # fmt: skip
+    """Raise a ``ShapeProgError`` unless a value is a number from ``least``, or ``above`` it, to ``most``, and finite or
+    ``endless``."""
     number = number_of(value, whole=whole)
     if not ((endless or math.isfinite(number)) and least <= number <= most) or (above and number == least):
         bounds = f"above {least:g}" if above else f"of {least:g} or more"
@@ -68,8 +60,9 @@ def check_tensor(
         raise ShapeProgError(f"{name} has the shape {sizes}", f"give the shape {wanted}{letters}")
 
 
-def check_finite(name: str, value: Any) -> None:
-    """Raise a ``ShapeProgError`` if a tensor holds numbers that are not finite, for which no distance has a meaning."""
+def check_points(name: str, value: Any) -> None:
+    """Raise a ``ShapeProgError`` unless a value is a tensor of points (..., P, 3) that are finite."""
+    check_tensor(name, value, "P", 3)
     if not (finite := value.detach().isfinite()).all():
         wrong = int((~finite.all(-1)).sum())
         cure = f"remove them, as {name}[{name}.isfinite().all(-1)] does for one cloud"

@@ -24,16 +24,9 @@ from shapeprog.space import Array
 
 
 def shape_from_mesh(
-    vertices: npt.ArrayLike,
-    faces: npt.ArrayLike,
-    *,
-    up: str | None = None,
-    front: str | None = None,
-    name: str = "mesh",
-    points: int = 5000,
-    seed: int = 0,
-    unit: str = "",
-) -> Shape:
+    vertices: npt.ArrayLike, faces: npt.ArrayLike, *, up: str | None = None, front: str | None = None,
+    name: str = "mesh", points: int = 5000, seed: int = 0, unit: str = "",
+) -> Shape:  # fmt: skip
     """The shape of a triangle mesh.
 
     Parameters
@@ -68,64 +61,25 @@ def shape_from_mesh(
 
 
 def shape_from_points(
-    cloud: npt.ArrayLike,
-    *,
-    up: str | None = None,
-    front: str | None = None,
-    name: str = "points",
-    points: int = 5000,
-    seed: int = 0,
-    unit: str = "",
-) -> Shape:
-    """The shape of a point cloud (P, 3) of a surface; inference estimates its normals.
+    cloud: npt.ArrayLike, *, up: str | None = None, front: str | None = None, name: str = "points",
+    points: int = 5000, seed: int = 0, unit: str = "",
+) -> Shape:  # fmt: skip
+    """The shape of a cloud of at least 100 points (P, 3) of a surface; inference estimates its normals.
 
-    Parameters
-    ----------
-    cloud
-        Positions (P, 3), at least 100.
-    up, front, name, unit
-        As for :func:`shapeprog.shape_from_mesh`.
-    points, seed
-        How many of the points to keep at most, besides the 20,000 that inference uses, and the seed of that choice.
-
-    Raises
-    ------
-    InputError
-        If the array has another shape or type, a number that is not finite, or too few points.
-    ShapeProgError
-        As for :func:`shapeprog.shape_from_mesh`.
+    At most ``points`` are kept, besides the 20,000 that inference uses.  All else is as for
+    :func:`shapeprog.shape_from_mesh`.
     """
     make = partial(placement.shape_from_points, _numbers("cloud", cloud, 2), points=points, seed=seed)
     return _made(make, name, up, front, points, seed, unit)
 
 
 def shape_from_voxels(
-    voxels: npt.ArrayLike,
-    *,
-    up: str | None = None,
-    front: str | None = None,
-    name: str = "voxels",
-    unit: str = "",
+    voxels: npt.ArrayLike, *, up: str | None = None, front: str | None = None, name: str = "voxels", unit: str = ""
 ) -> Shape:
-    """The shape of a voxel grid (R, R, R) of booleans, or of 0 and 1.
+    """The shape of a voxel grid (R, R, R) of booleans, or of 0 and 1, whose cells have the side 1 of a unit.
 
-    Parameters
-    ----------
-    voxels
-        Occupied cells.  Inference works best where the solid is filled.
-    up, front
-        Axes of the array such as ``+y`` and ``-z``; by default those of the grid: up, to the rear, left.
-    name
-        Name of the shape.
-    unit
-        Unit of the side of a cell, where it is known.
-
-    Raises
-    ------
-    InputError
-        If the array has another shape or other values, or no cell is occupied.
-    ShapeProgError
-        If there is no such unit.
+    By default the axes of the array are those of the grid: up, to the rear, left.  All else is as for
+    :func:`shapeprog.shape_from_mesh`.
     """
     cells = occupied(_numbers("voxels", voxels, 3), "voxels").copy()  # the shape keeps them
     return _made(partial(placement.shape_from_voxels, cells), name, up, front, 1, 0, unit, cloud=False)

@@ -40,13 +40,9 @@ Prediction = Result | Shape
 
 
 def evaluate(
-    prediction: Program | Inferred,
-    target: Shape | str | Path,
-    frame: Frame | None = None,
-    *,
-    points: int = POINTS,
-    seed: int = 0,
-) -> Metrics:
+    prediction: Program | Inferred, target: Shape | str | Path, frame: Frame | None = None, *,
+    points: int = POINTS, seed: int = 0,
+) -> Metrics:  # fmt: skip
     """Measure how well a program rebuilds a shape, as the command ``shapeprog evaluate`` does.
 
     Parameters

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from shapeprog.arguments import check_finite, check_tensor
+from shapeprog.arguments import check_points, check_tensor
 from shapeprog.geometry.batch import Batch
 from shapeprog.geometry.distance import signed_distance
 from shapeprog.geometry.nearest import squared_distance
@@ -45,10 +45,9 @@ def chamfer(
     Raises
     ------
     ShapeProgError
-        If a tensor has another type or shape, or the target numbers that are not finite.
+        If a tensor has another type or shape, or the target a number that is not finite.
     """
-    check_tensor("target", target, "Q", 3)
-    check_finite("target", target)
+    check_points("target", target)
     there = _mean(squared_distance(points, target), weights)
     return there + _mean(squared_distance(target, points), target_weights)
 
@@ -80,15 +79,14 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
         If ``scene`` is no scene, or the target has another type or shape, or numbers that are not finite.
     """
     distance = signed_distance(scene, target)
-    check_finite("target", target)
+    check_points("target", target)
     return (distance.abs() if surface else distance.clamp(min=0)).mean(-1)
 
 
 def excess(points: Cloud, target: Target, *, weights: Weights | None = None) -> Values:
     """How far points of the prediction are from the target on average: the reverse of coverage; raises what
     :func:`chamfer` does."""
-    check_tensor("target", target, "Q", 3)
-    check_finite("target", target)
+    check_points("target", target)
     return _mean(torch.sqrt(squared_distance(points, target).clamp(min=1e-12)), weights)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from jaxtyping import Float, Int, UInt8
 
-from shapeprog.arguments import check_finite
+from shapeprog.arguments import check_points
 from shapeprog.geometry.batch import Batch
 from shapeprog.lazy_torch import Tensor, torch
 from shapeprog.space import RESOLUTION
@@ -31,7 +31,7 @@ class Scene(Batch):
         from shapeprog.geometry.distance import signed_distance
 
         distance = signed_distance(self, points)
-        check_finite("points", points)
+        check_points("points", points)
         return distance
 
     def voxels(self, resolution: int = RESOLUTION) -> UInt8[Tensor, "*batch R R R"]:

@@ -97,7 +97,7 @@ GRID_POINTS, TRIANGLE = np.zeros((5, 3), np.float32), np.array([[0, 1, 2]], np.i
         ),
         (lambda: sp.Shape("a", GRID * 1), r"voxels of a shape is int64 of .*\n.*shape_from_voxels"),
         (lambda: sp.Shape("a", GRID, GRID_POINTS[:, :2]), r"\(5, 2\)\n  hint: give float32 of the shape \(..., 3\)"),
-        (lambda: sp.Shape("a", GRID, GRID_POINTS.astype(np.float64)), "points of a shape is float64"),
+        (lambda: sp.Shape("a", GRID, GRID_POINTS.astype(str)), "points of a shape is <U"),
         (lambda: sp.Shape("a", GRID, GRID_POINTS / 0), "not finite"),
         (lambda: sp.Shape("a", GRID, scan=GRID_POINTS[0]), r"scan of a shape is float32 of the shape \(3,\)"),
         (lambda: sp.Shape("a", GRID, vertices=GRID_POINTS), "both vertices and faces"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,8 @@ class Shape:
     """A shape in the grid frame: centred, its longest side 24 cells, axes up, depth and left-right.
 
     :func:`shapeprog.load_shape` makes it from a file, :func:`shapeprog.shape_from_mesh` and its neighbours from arrays
-    in any coordinates.  An array of another shape or type, or with numbers that are not finite, is an ``InputError``.
+    in any coordinates.  Arrays are cast to the precision below; one of another shape or kind, or with numbers that are
+    not finite, is an ``InputError``.
 
     Parameters
     ----------
@@ -69,10 +70,11 @@ class Shape:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        _check("voxels", self.voxels, np.bool_, (RESOLUTION,) * 3)
-        for name, kind in (("points", np.float32), ("scan", np.float32), ("vertices", np.float32), ("faces", np.int32)):
+        kinds: dict[str, Any] = {"points": np.float32, "scan": np.float32, "vertices": np.float32, "faces": np.int32}
+        object.__setattr__(self, "voxels", _checked("voxels", self.voxels, np.bool_, (RESOLUTION,) * 3))
+        for name, kind in kinds.items():
             if (array := getattr(self, name)) is not None:
-                _check(name, array, kind, (*np.shape(array)[:1], 3))
+                object.__setattr__(self, name, _checked(name, array, kind, (*np.shape(array)[:1], 3)))
         if (self.vertices is None) != (self.faces is None):
             raise InputError("a mesh has both vertices and faces, or neither", _CURE)
         if self.vertices is not None and self.faces is not None:
@@ -123,12 +125,13 @@ def unit_of_result(shape: Shape, program: Program, name: str = "") -> Unit | Non
     return Unit.of(shape.frame, name, shape.file_unit) if name else Unit(shape.file_unit, shape.frame.scale)
 
 
-def _check(name: str, array: Array, kind: type[np.generic], shape: tuple[int, ...]) -> None:
-    """Refuse anything but a finite array of a kind and a shape."""
+def _checked(name: str, array: Array, kind: type[np.generic], shape: tuple[int, ...]) -> Array:
+    """A finite array of a shape in a type of numbers; an ``InputError`` for another one, or another kind of type."""
     if not isinstance(array, np.ndarray):
         raise InputError(f"{name} of a shape is no array of NumPy but {type(array).__name__}", _CURE)
-    if array.dtype != kind or array.shape != shape:
+    if not np.can_cast(array.dtype, kind, "same_kind") or array.shape != shape:
         wanted = f"{kind.__name__} of the shape {'(..., 3)' if len(shape) == 2 else shape}"
         raise InputError(f"{name} of a shape is {array.dtype} of the shape {array.shape}", f"give {wanted}, or {_CURE}")
     if not np.isfinite(array).all():
         raise InputError(f"{name} of a shape holds numbers that are not finite", "remove or mend them")
+    return array.astype(kind, copy=False)

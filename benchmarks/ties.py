@@ -132,7 +132,8 @@ def of_furniture(task: Task) -> dict[str, Any]:
     evidence = evidence_of_program(planted if task.set == "fitted" else noisy, task.seed)
     started = time.process_time()
     known = task.set == "alone"
-    tied = tie(noisy if known else between_ends(noisy), evidence, known=known, seed=task.seed)
+    floor = None if known else float(evidence.surface[:, 0].min())
+    tied = tie(noisy if known else between_ends(noisy), evidence, known=known, floor=floor, seed=task.seed)
     seconds = time.process_time() - started
     drawn, plain, ways = redrawn(task.number, task.seed), plain_slopes(planted), slopes(tied, planted)
     written = relations_written(len(plain))

@@ -81,7 +81,7 @@ def infer_command(
     if paper and unit not in (None, CELLS):
         raise InputError(f"--unit {unit} has no effect on --paper", "its statements are in cells; leave one out")
     report = None if as_json else lambda sentence: terminal.note(f"{sentence.capitalize()}.")
-    others = ["geometry/voxelise", "geometry/neighbour", "evaluation/", *([] if no_picture else ["view/"])]
+    others = ["geometry/voxelise", "evaluation/", *([] if no_picture else ["view/"])]
     prepare(modules_of(*SURFACE_KERNELS, *others), report)
     inference = partial(
         infer, blocks=blocks, budget=budget, seed=seed, settings=None if rounds is None else Settings(rounds=rounds),

@@ -1,22 +1,22 @@
-"""Exact nearest neighbours between point clouds: kernels search a uniform grid, by threads over the batch.
+"""Exact nearest neighbours between point clouds, by trees and with threads over the batch.
 
-They run on the CPU, wherever the tensors are.
+They are found on the CPU, wherever the tensors are.
 """
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import torch
 from jaxtyping import Float, Int
+from scipy.spatial import cKDTree
 from torch import Tensor
 
 from shapeprog.arguments import check_tensor
 from shapeprog.errors import ShapeProgError
-from shapeprog.geometry import neighbour_kernels as kernels
 from shapeprog.geometry.arrays import numbers, over_threads
 from shapeprog.space import Array
+
+FAR = 1e150  # coordinates are searched up to here: their squares are finite
 
 Cloud = Float[Tensor, "*batch P 3"]
 Other = Float[Tensor, "*batch Q 3"]
@@ -58,9 +58,15 @@ def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[
 
 
 def _neighbours(queries: Tensor, points: Tensor) -> Array:
-    """Rows of the nearest points among those of all clouds (B, P), without gradient."""
-    (clouds, source), count = queries.shape[:2], points.shape[1]
-    index = np.empty(clouds * source, np.int64)
-    data = numbers(queries).reshape(-1, 3), source, numbers(points).reshape(-1, 3), count, index
-    over_threads(partial(kernels.neighbours, *data), clouds)
-    return index.reshape(clouds, source)
+    """Rows of the nearest points among those of all clouds (B, P), without gradient; no number is far away."""
+    sources, clouds = (
+        np.nan_to_num(numbers(cloud), nan=FAR, posinf=FAR, neginf=-FAR).clip(-FAR, FAR) for cloud in (queries, points)
+    )
+    rows = np.empty(sources.shape[:2], np.int64)
+
+    def search(first: int, last: int) -> None:
+        for cloud in range(first, last):
+            rows[cloud] = cKDTree(clouds[cloud]).query(sources[cloud])[1] + cloud * clouds.shape[1]
+
+    over_threads(search, len(clouds))
+    return rows

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from shapeprog.errors import InputError
-from shapeprog.geometry.voxelise_kernels import first_hits, mark_hidden, mark_triangles
+from shapeprog.geometry.voxelise_kernels import mark_triangles
 from shapeprog.space import HALF, RESOLUTION, Array, BoolArray
 
 SHRINK = 1 / 256
@@ -77,7 +77,7 @@ def voxelise_points(points: Array) -> BoolArray:
     some = positions[:: max(1, len(positions) // 2000)]
     distance, _ = cKDTree(positions).query(some, k=[min(2, len(positions))])
     spacing = float(np.median(np.asarray(distance)))
-    _carve(touched.copy(), int(np.clip(np.ceil(4 * spacing), 1, 4)), 0, 1, touched)
+    _carve(touched, int(np.clip(np.ceil(4 * spacing), 1, 4)), 0, 1, touched)
     return touched
 
 
@@ -132,11 +132,28 @@ def occupied_bounds(voxels: Array, name: str = "the voxel grid") -> tuple[Array,
 
 
 def _carve(barrier: BoolArray, hole: int, start: int, stride: int, cells: BoolArray) -> None:
-    """Mark the cells that none of the six views along the axes can see (Nooruddin & Turk 2003, ray stabbing)."""
-    views, scratch = np.empty((6, *barrier.shape[:2]), np.int64), np.empty(barrier.shape[:2], np.int64)
-    for side in range(6):
-        first_hits(barrier, side // 2, bool(side % 2), hole, scratch, views[side])
-    mark_hidden(views, start, stride, cells)
+    """Mark the cells that none of the six views along the axes can see (Nooruddin & Turk 2003, ray stabbing).
+
+    A ray that passes where the rays around it, within ``hole`` lines on all four sides, are stopped earlier, is stopped
+    as late as the latest of those four: a missing triangle lets nothing through, while a slot, open along one
+    direction, stays.  Cell ``k`` along an axis is cell ``start + stride * k`` of the barrier (N, N, N).
+    """
+    size, place = len(barrier), start + stride * np.arange(len(cells))
+    hidden = np.ones_like(cells)
+    for axis in range(3):
+        for reverse in (False, True):
+            layers = np.moveaxis(barrier, axis, 0)[:: -1 if reverse else 1]
+            depth = np.where(layers.any(0), layers.argmax(0), size)
+            around = np.pad(depth, hole, constant_values=size)
+            steps = range(1, hole + 1)
+            sides = [
+                np.min([np.roll(around, (step * down, step * right), (0, 1)) for step in steps], 0)
+                for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1))
+            ]
+            closed = np.minimum(depth, np.max(sides, 0)[hole:-hole, hole:-hole])[np.ix_(place, place)]
+            behind = size - 1 - place if reverse else place
+            hidden &= np.moveaxis(closed <= behind[:, None, None], 0, axis)
+    cells |= hidden
 
 
 def _mark_boundary_sheets(triangles: Array, cells: BoolArray) -> None:

@@ -1,4 +1,4 @@
-"""Kernels on packed cells: filling them, spreading their bits over bytes."""
+"""The kernel that fills packed cells."""
 
 from __future__ import annotations
 
@@ -68,12 +68,3 @@ def fill(table, owner, per_scene, planes, begin, end):
             square = square and abs(table[row, column] - np.rint(table[row, column])) <= SQUARE
         if math.isfinite(total) and not cells(table, row, square, planes, owner[row], low, high):
             _fill_turned(table, row, planes, owner[row], low, high)
-
-
-@kernel("void(u4[::1], u8[::1], u8[:, ::1], i8, i8)")
-def unpack(words, table, cells, begin, end):
-    """Words of 32 cells as bits (M,) to bytes, given as eights (M, 4); the table spreads 8 bits over 8 bytes."""
-    for k in range(begin, end):
-        bits = words[k]
-        for part in range(4):
-            cells[k, part] = table[(bits >> np.uint32(8 * part)) & np.uint32(255)] if bits != 0 else np.uint64(0)

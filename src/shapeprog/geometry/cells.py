@@ -24,8 +24,6 @@ from shapeprog.space import RESOLUTION, Array
 
 Cells = Int[Tensor, "*batch words R"]  # packed cells
 
-_SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8), bitorder="little").view(np.uint64)
-
 
 def rasterise(batch: Batch, resolution: int = RESOLUTION) -> Cells:
     """The packed cells that the primitives of each element occupy, clipped to the grid; see :func:`voxels`."""
@@ -83,11 +81,8 @@ def pack_rows(rows: Bool[Tensor, "*batch places"]) -> Int[Tensor, "*batch words"
 def unpack(cells: Cells) -> UInt8[Tensor, "*batch R R R"]:
     """Grids of cells, 1 or 0, of packed ones."""
     rows = cells.unflatten(-2, (-1, cells.shape[-1])).movedim(-3, -1)  # the words of every row side by side
-    words = words_of(rows).reshape(-1)
-    eights = np.empty((len(words), 4), np.uint64)
-    over_threads(partial(kernels.unpack, words, _SPREAD, eights), len(words), least=1 << 15)
-    voxels = torch.from_numpy(eights.view(np.uint8)).reshape(*rows.shape[:-1], -1)
-    return voxels[..., : cells.shape[-1]].contiguous().to(cells.device)
+    bits = np.unpackbits(words_of(rows).view(np.uint8), -1, count=cells.shape[-1], bitorder="little")
+    return torch.from_numpy(bits).to(cells.device)
 
 
 def count(cells: Cells) -> Int[Tensor, "*batch"]:

@@ -11,8 +11,6 @@ from shapeprog.kernels.bits import uniform
 from shapeprog.kernels.compile import helper, kernel
 from shapeprog.kernels.table import CENTRE, ROTATION, local, turned
 
-GUIDE = 256  # steps of the table that shortens the search for a face
-
 
 @helper
 def _inside(table, row, x, y, z):
@@ -46,25 +44,16 @@ def visible(table, per_scene, shares, seed, skin, attempts, n, chosen, places, f
     candidates were visible, n at most; -1 if one of them is farther away than ``FARTHEST``.
     """
     box, lower = np.empty((6, per_scene), np.float32), np.empty(per_scene, np.float32)
-    guide = np.empty(GUIDE + 1, np.int64)
     faces = shares.shape[1] // max(per_scene, 1)
     for scene in range(begin, end):
         first, stream, base = scene * per_scene, scene << 40, scene * n
         extent = boxes_around(table, first, per_scene, box)
-        cell = 0
-        for step in range(GUIDE + 1):
-            while cell < shares.shape[1] and shares[scene, cell] <= step / GUIDE:
-                cell += 1
-            guide[step] = cell
         accepted = 0
         for candidate in range(attempts):
             if accepted == n:
                 break
             count = stream + 4 * candidate
-            number = uniform(seed, count)
-            cell = guide[int(number * GUIDE)]
-            while shares[scene, cell] <= number:
-                cell += 1
+            cell = np.searchsorted(shares[scene], uniform(seed, count), side="right")
             slot, face = cell // faces, cell % faces
             row = first + slot
             one, two, three = uniform(seed, count + 1), uniform(seed, count + 2), uniform(seed, count + 3)

@@ -1,12 +1,10 @@
 """The command ``shapeprog``, which is ``python -m shapeprog``."""
 
-import gc
 import sys
 
 
 def main() -> None:
     """Run the command; Ctrl-C ends it in a line, while it imports its modules too."""
-    gc.set_threshold(500_000)  # imports make many objects, of which none becomes free
     try:
         from shapeprog.cli import main as command
 

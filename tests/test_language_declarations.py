@@ -153,7 +153,6 @@ def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solid
         ("leg", {}, crate, "'leg' is declared twice"),
         ("crate", {"id": 1}, crate, "wants id 1, which belongs to leg"),
         ("crate", {"id": 0}, crate, "belongs to the language itself"),
-        ("crate", {"paper": ("Leg", "Cub")}, crate, "the paper's name"),
         ("my crate", {}, crate, "not a Python identifier"),
         ("for", {}, crate, "not a Python identifier"),
         ("crate", {}, no_doc, "no docstring"),

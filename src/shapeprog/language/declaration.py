@@ -57,9 +57,8 @@ class Statement:
 
     Parameters
     ----------
-    name, id, doc, parameters, paper
-        Word in program text, number in tensors, one line of manual, and named parameters in slot order; names in the
-        notation of the paper, such as ``("Leg", "Cub")``.
+    name, id, doc, parameters
+        Word in program text, number in tensors, one line of manual, and named parameters in slot order.
     draw, move
         The function of a drawing statement from parameter tensors by name to one or more :class:`Solids`; or of a loop
         ``(copy index, quarter, **parameters) -> Motion``.
@@ -80,7 +79,6 @@ class Statement:
     move: Callable[..., Motion] | None = None
     pivot: Callable[..., Float[Tensor, "*batch 3"]] | None = None
     quarter: bool = False
-    paper: tuple[str, str] | None = None
     taught: bool = True
     hint: Hint | None = None
 

@@ -1,6 +1,6 @@
 """One declaration per statement: id, named parameters, one line of doc, and the solids it draws.
 
-    @statement("leg", id=1, paper=("Leg", "Cub"))
+    @statement("leg", id=1)
     def leg(at: Position, size: Extent) -> Solids:
         "A leg: an upright board or post from its low front right corner."
         return box(at, size)
@@ -153,10 +153,6 @@ class Language:
         if declared.id in owners:
             free = f"leave the id out; the next free one is {self.free_id()}"
             yield f"{what} wants id {declared.id}, which belongs to {owners[declared.id]}", free
-        for twin in others:
-            if declared.paper and twin.paper == declared.paper:
-                cure = "leave it out; the notation then uses the statement's own name"
-                yield f"{what} has the paper's name {declared.paper}, which belongs to {twin.name}", cure
 
     def forget(self, name: str) -> None:
         """Take a declaration out again."""
@@ -229,7 +225,6 @@ def statement(
     *,
     id: int | None = None,
     doc: str = "",
-    paper: tuple[str, str] | None = None,
     pivot: Callable[..., Tensor] | None = None,
     quarter: bool = False,
     taught: bool = True,
@@ -240,15 +235,13 @@ def statement(
     Without ``doc`` the manual shows the first paragraph of the function's docstring; :class:`Statement` has the rest.
     A cell of a notebook that is run again, or another one that declares the same name, replaces the declaration.
     """
-    fields = {"pivot": pivot, "quarter": quarter, "paper": paper, "taught": taught, "hint": hint}
+    fields = {"pivot": pivot, "quarter": quarter, "taught": taught, "hint": hint}
     return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, **fields)
 
 
-def loop(
-    name: str, *, id: int | None = None, paper: tuple[str, str] | None = None, taught: bool = True
-) -> Callable[[Callable[..., Motion]], Statement]:
+def loop(name: str, *, id: int | None = None, taught: bool = True) -> Callable[[Callable[..., Motion]], Statement]:
     """Declare a loop from a function ``(copy, quarter, count, ...) -> Motion``; the first parameter is the count."""
-    return lambda move: _declare(name, id, "", move, 2, move=move, paper=paper, taught=taught)
+    return lambda move: _declare(name, id, "", move, 2, move=move, taught=taught)
 
 
 def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], skip: int, **fields: Any) -> Statement:

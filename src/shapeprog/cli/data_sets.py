@@ -171,7 +171,7 @@ def evaluate_command(
     from shapeprog.data.parts import part_files
     from shapeprog.evaluation import scoring
     from shapeprog.evaluation.metrics import summarise
-    from shapeprog.formats.json_form import Result
+    from shapeprog.formats.json_form import SavedResult
 
     terminal.load_modules(modules)
     terminal.check_axes(up, front)
@@ -182,15 +182,14 @@ def evaluate_command(
     hidden = terminal.quiet or as_json
     for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=hidden):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
-        if isinstance(prediction, Result) and prediction.program.source is not None:
+        if isinstance(prediction, SavedResult) and prediction.program.source is not None:
             terminal.warn(path, *prediction.program.source.warnings)
         try:
-            if isinstance(prediction, Result) and target is not None:
-                target = target if up or front else scoring.in_pose_of(prediction, target, points, seed)
-                prediction = scoring.aligned(prediction, target)
+            if isinstance(prediction, SavedResult) and target is not None and not (up or front):
+                target = scoring.in_pose_of(prediction, target, points, seed)
             rows.append(scoring.measure(prediction, target, points, seed))
-            if isinstance(prediction, Result) and target is not None and target.name in files:
-                rows[-1] = scoring.with_parts(rows[-1], prediction.program, target, files[target.name], seed)
+            if isinstance(prediction, SavedResult) and target is not None and target.name in files:
+                rows[-1] = scoring.with_parts(rows[-1], prediction, target, files[target.name], seed)
         except ShapeProgError as mistake:
             failures.append(ShapeProgError(f"prediction {name}: {mistake.message}", mistake.hint))
         except Exception as unexpected:

@@ -231,16 +231,16 @@ def _input_and_scores(
     The input is the file that the user names, or the one that the .json file names.  The latter is opened only beside
     the program, or in the folder that the user names and deeper: a program from elsewhere may name any file.
     """
-    from shapeprog.formats.json_form import Result, read_result
+    from shapeprog.formats.json_form import SavedResult, read_result
     from shapeprog.language.program import Program
 
     kept = not changes and program.suffix.lower() == ".json"
-    result = read_result(program) if kept else Result(Program())
+    result = read_result(program) if kept else SavedResult(Program())
     if named is not None and not named.is_dir():
         return _as_inferred(named, frame), result.scores, ""
     if named is not None and not kept:  # the text may have been edited, so that the scores are of another program
         with suppress(ShapeProgError):
-            result = Result(Program(), source=read_result(program.with_suffix(".json")).source)
+            result = SavedResult(Program(), source=read_result(program.with_suffix(".json")).source)
     if not result.source:
         return None, result.scores, "" if named is None else "no .json of its name beside the program names one"
     place, mark, member = result.source.partition("#")

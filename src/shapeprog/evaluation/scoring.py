@@ -26,21 +26,21 @@ from shapeprog.evaluation.parts import part_scores
 from shapeprog.formats.files import load_with_frame, program_files
 from shapeprog.formats.format import suffixes
 from shapeprog.formats.frames import in_grid_of
-from shapeprog.formats.json_form import Result, read_result
+from shapeprog.formats.json_form import SavedResult, read_result
 from shapeprog.geometry.voxelise import voxelise_mesh, voxelise_points
 from shapeprog.language.program import Program
 from shapeprog.language.unroll import unroll
 from shapeprog.space import Array, Frame
 
 if TYPE_CHECKING:
-    from shapeprog.inference.infer import Result as Inferred
+    from shapeprog.inference.infer import Result
 
-Prediction = Result | Shape
+Prediction = SavedResult | Shape
 """The contents of a program file, or a shape."""
 
 
 def evaluate(
-    prediction: Program | Inferred, target: Shape | str | Path, frame: Frame | None = None, *,
+    prediction: Program | Result, target: Shape | str | Path, frame: Frame | None = None, *,
     points: int = POINTS, seed: int = 0,
 ) -> Metrics:  # fmt: skip
     """Measure how well a program rebuilds a shape, as the command ``shapeprog evaluate`` does.
@@ -72,7 +72,7 @@ def evaluate(
     program, snapped = getattr(prediction, "program", prediction), getattr(prediction, "snapped", None)
     if not isinstance(program, Program):
         raise ShapeProgError(f"{prediction!r} is no program", "give a program, or the result of sp.infer")
-    result = Result(program, frame, snapped)
+    result = SavedResult(program, frame, snapped)
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
     shape = in_pose_of(result, shape, points, seed)
     if frame is not None and not np.allclose(frame.axes, shape.frame.axes, atol=1e-6):
@@ -80,7 +80,7 @@ def evaluate(
             "the program has other axes than the target",
             "load the target with the axes of the frame: up and front of sp.load_shape",
         )
-    return measure(aligned(result, shape), shape, points, seed)
+    return measure(result, shape, points, seed)
 
 
 def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:
@@ -95,7 +95,7 @@ def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str,
     for file in files:
         try:
             with in_words(file, "a program"):
-                result = read_result(file) if file.suffix.lower() == ".json" else Result(*load_with_frame(file))
+                result = read_result(file) if file.suffix.lower() == ".json" else SavedResult(*load_with_frame(file))
         except ShapeProgError as error:
             yield file, file.stem, error
         else:
@@ -131,14 +131,6 @@ def in_pose_of(prediction: Prediction, target: Shape, points: int, seed: int) ->
     return load_in_axes(path, frame, points=2 * points, seed=seed)
 
 
-def aligned(prediction: Prediction, target: Shape) -> Prediction:
-    """A predicted program in the grid of its target; shapes are unchanged."""
-    if isinstance(prediction, Shape):
-        return prediction
-    program = in_grid_of(prediction.program, prediction.frame, target.frame)
-    return prediction._replace(program=program, frame=target.frame)
-
-
 def measure(prediction: Prediction | ShapeProgError, target: Shape | None, points: int, seed: int) -> Metrics:
     """The measures of one prediction; sizes are 0 for shapes.  Raises the error that stands for a prediction."""
     if isinstance(prediction, ShapeProgError):
@@ -147,12 +139,14 @@ def measure(prediction: Prediction | ShapeProgError, target: Shape | None, point
         raise InputError("there is no target of this name", "give both the same name")
     if isinstance(prediction, Shape):
         return _measure_shape(prediction, target, points, seed)
-    return evaluate_program(prediction.program, target, prediction.snapped, points, seed, looks=True)
+    program = in_grid_of(prediction.program, prediction.frame, target.frame)
+    return evaluate_program(program, target, prediction.snapped, points, seed, looks=True)
 
 
-def with_parts(row: Metrics, program: Program, target: Shape, files: list[Path], seed: int) -> Metrics:
+def with_parts(row: Metrics, prediction: SavedResult, target: Shape, files: list[Path], seed: int) -> Metrics:
     """The measures with recall and precision of the physical parts in ``files``, see :func:`read_parts`."""
     parts = [Triangles(target.frame.to_grid(vertices), faces) for vertices, faces in read_parts(files)]
+    program = in_grid_of(prediction.program, prediction.frame, target.frame)
     return replace(row, **part_scores(parts, unroll(program), seed)._asdict())
 
 

@@ -40,7 +40,7 @@ VERSION = 4
 MOST_SOLIDS = 10_000  # solids of the largest list; longer ones are left out
 
 
-class Result(NamedTuple):
+class SavedResult(NamedTuple):
     """The contents of a JSON file.
 
     Parameters
@@ -62,12 +62,12 @@ class Result(NamedTuple):
     source: str | None = None
 
 
-def read_result(path: Path) -> Result:
+def read_result(path: Path) -> SavedResult:
     """The contents of a JSON file; raises what :func:`program_from_json` does."""
     return result_from_json(read_text(path), str(path))
 
 
-def result_from_json(text: str, name: str) -> Result:
+def result_from_json(text: str, name: str) -> SavedResult:
     """The contents of a JSON text; raises what :func:`program_from_json` does."""
     content = _document(text, name)
 
@@ -79,7 +79,7 @@ def result_from_json(text: str, name: str) -> Result:
 
     scores, source = content.get("scores"), content.get("source")
     named = scores.items() if isinstance(scores, dict) else ()
-    return Result(
+    return SavedResult(
         *parsed("text"), parsed("snapped")[0] if "snapped" in content else None,
         {word: value for word, value in named if type(value) in (int, float) and abs(value) <= LARGEST},
         source if isinstance(source, str) else None,

@@ -23,6 +23,7 @@ from shapeprog.geometry.primitives import primitives
 from shapeprog.language.program import Chain, Draw, Loop, Program
 from shapeprog.language.statement import Statement, language, remembered
 from shapeprog.language.unroll import unroll
+from shapeprog.library.independence import independent
 from shapeprog.space import DEPTH, HALF, SIDE, SPAN, UP, FloatArray
 
 ZERO = 1e-6
@@ -281,11 +282,8 @@ def _solid(declared: Statement) -> Solid:
     if not torch.allclose(form(check), slope @ check + constant):
         return plain
     rows = np.round(np.hstack([slope.numpy(), constant[:, None].numpy()]), 9) + 0.0
-    selected = list(range(6))
-    for index in range(6, len(rows)):
-        if np.linalg.matrix_rank(rows[[*selected, index]]) > np.linalg.matrix_rank(rows[selected]):
-            selected.append(index)
-    if np.linalg.matrix_rank(rows[selected, :-1]) < width:
+    selected = [*range(6), *(index for index in independent(rows) if index >= 6)]
+    if len(independent(rows[selected, :-1])) < width:
         return plain
     corner = [Slot("at", "position", axis) for axis in range(3)] + [Slot("size", "length", axis) for axis in range(3)]
     extra = [Slot(primitives[solids[0].kind].sizes[index - 6], "length", -1) for index in selected[6:]]

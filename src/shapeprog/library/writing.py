@@ -12,6 +12,7 @@ from shapeprog.language.expression import Binary, Linear, Name, Value
 from shapeprog.language.placement import BOX_IN_CELLS, RESERVED
 from shapeprog.language.statement import language
 from shapeprog.library.blocks import PAIR, Kind, solid_of
+from shapeprog.library.independence import independent
 from shapeprog.library.measures import Group, Measure, measures, within_box
 from shapeprog.space import FloatArray
 
@@ -39,14 +40,13 @@ def basis(group: Group, box: FloatArray, typical: FloatArray, rows: FloatArray, 
     every = sorted(within_box(measures(group, typical), box), key=lambda measure: (measure.price, measure.block))
     sides = [Measure(0, word, "length", -1, row, 0.0) for word, row in zip(BOX_IN_CELLS, box, strict=True)]
     last = [next(measure for measure in every if np.array_equal(measure.row, row)) for row in openings]
-    stack, selected = list(rows), list[Measure]()
-    for measure in [*sides, *last, *every]:
-        if len(stack) < group.size and np.linalg.matrix_rank([*stack, measure.row], tol=SAME) > len(stack):
-            stack.append(measure.row)
-            selected.append(measure)
-    if len(stack) < group.size:
+    offered = [*sides, *last, *every]
+    stack = np.vstack([rows, *(measure.row for measure in offered)])
+    accepted = independent(stack)
+    if len(accepted) < group.size:
         return None
-    factors = np.linalg.inv(np.stack(stack))[:, len(rows) :]
+    selected = [offered[index - len(rows)] for index in accepted[len(rows) :]]
+    factors = np.linalg.inv(stack[accepted])[:, len(rows) :]
     rounded = np.round(factors * 4) / 4
     if np.abs(factors - rounded).max(initial=0) > SAME:
         return None

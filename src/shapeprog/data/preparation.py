@@ -196,12 +196,6 @@ def _preference(path: Path) -> tuple[bool, bool, str]:
 
 def _unit_frame(shape: Shape) -> Frame:
     """The frame of a world in which the bounding box of the shape has diagonal 1 and is centred."""
-    if shape.vertices is not None and shape.faces is not None:
-        corners = shape.vertices[np.unique(shape.faces)]
-        extents = np.ptp(corners.astype(np.float64), axis=0)
-    elif shape.points is not None:
-        extents = np.ptp(shape.points.astype(np.float64), axis=0)
-    else:
-        extents = np.ptp(np.argwhere(shape.voxels), axis=0) + 1.0
+    extents = shape.extents
     longest = SPAN / float(np.linalg.norm(extents * (SPAN / extents.max())))
     return replace(Frame(), scale=longest / SPAN)

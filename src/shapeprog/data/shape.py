@@ -14,7 +14,7 @@ from shapeprog.errors import InputError
 from shapeprog.formats.format import CELLS
 from shapeprog.language.program import Program
 from shapeprog.language.unit import MOST_METRES, Unit, assumed_unit, metres
-from shapeprog.space import RESOLUTION, SPAN, Array, Frame
+from shapeprog.space import RESOLUTION, SPAN, Array, FloatArray, Frame
 
 IN_METRES, IN_MILLIMETRES = (".glb", ".gltf"), (".stl", ".3mf")
 """Suffixes of formats whose unit is the metre by definition, and the millimetre by convention."""
@@ -86,6 +86,16 @@ class Shape:
         held = [f"{len(array):,} {name}" for name, array in counts.items() if array is not None]
         size = f"longest side {SPAN * self.frame.scale:.4g} {self.file_unit}".rstrip()
         return f"<Shape {self.name!r}: {', '.join([self.kind, *held, f'{self.voxels.sum():,} cells', size])}>"
+
+    @property
+    def extents(self) -> FloatArray:
+        """Size (3,) in cells of the box around its mesh, else around its points, else around its cells; zeros if it is
+        empty."""
+        for positions in (self.vertices, self.points):
+            if positions is not None and len(positions):
+                return np.ptp(positions.astype(np.float64), axis=0)
+        occupied = np.argwhere(self.voxels)
+        return np.ptp(occupied, axis=0) + 1.0 if len(occupied) else np.zeros(3)
 
     @property
     def file_unit(self) -> str:

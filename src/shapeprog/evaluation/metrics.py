@@ -222,15 +222,8 @@ def world_scale(target: Shape) -> float:
 
 
 def _diagonal(target: Shape) -> float:
-    """The diagonal in cells of the bounding box of the mesh of a target, else of its points, else of its cells."""
-    if target.vertices is not None and len(target.vertices):
-        span = np.ptp(np.asarray(target.vertices, np.float64), axis=0)
-    elif target.points is not None and len(target.points):
-        span = np.ptp(np.asarray(target.points, np.float64), axis=0)
-    else:
-        cells = np.argwhere(target.voxels)
-        span = np.ptp(cells, axis=0) + 1.0 if len(cells) else np.ones(3)
-    return float(np.linalg.norm(span)) or 1.0
+    """The diagonal in cells of the bounding box of a target."""
+    return float(np.linalg.norm(target.extents)) or 1.0
 
 
 def _mesh(target: Shape) -> Triangles | None:

@@ -93,13 +93,13 @@ class _Level:
 class _Layout:
     """Where the solids that the statements return go, and the fields of a scene that no parameter changes.
 
-    ``drawn`` are the kinds of primitive by statement; ``source`` is the copy of each solid, ``None`` if they are the
-    same; ``gather`` the solid of each slot, one past the last for padding; ``signed`` which sizes may be negative;
-    ``fixed`` the fields of a scene that hold whole numbers.
+    ``drawn`` are the kinds of primitive by statement; ``source`` is the copy of each solid; ``gather`` the solid of
+    each slot, one past the last for padding; ``signed`` which sizes may be negative; ``fixed`` the fields of a scene
+    that hold whole numbers.
     """
 
     drawn: tuple[tuple[int, ...], ...]
-    source: Int[Tensor, " S"] | None
+    source: Int[Tensor, " S"]
     gather: Int[Tensor, " slots"]
     mask: Bool[Tensor, "*batch N"]
     signed: Bool[Tensor, "*batch N 4"]
@@ -199,14 +199,13 @@ class Plan:
         fixed = torch.cat([integers, integers.new_zeros(4, 1)], -1)[:, gather]
         extents = torch.tensor([primitive.extents for primitive in primitives], device=rank.device)[fixed[3]]
         signed = torch.arange(SIZES, device=rank.device) >= extents[..., None]
-        single = all(len(kinds) == 1 for kinds in returned)
         fields = dict(zip(("statement", "block", "copy", "kind"), fixed, strict=True))
         mask = gather < len(order)
-        self._known = _Layout(returned, None if single else source, gather.flatten(), mask, signed, fields)
+        self._known = _Layout(returned, source, gather.flatten(), mask, signed, fields)
         return self._known
 
     def _motion(
-        self, values: Float[Tensor, "R slots"], source: Int[Tensor, " S"] | None
+        self, values: Float[Tensor, "R slots"], source: Int[Tensor, " S"]
     ) -> tuple[Float[Tensor, "S 3 3"] | None, Float[Tensor, " S"] | None, Float[Tensor, "S 3"] | None]:
         """The turn or reflection of each solid, -1 where it is a reflection, and its shift.
 
@@ -237,9 +236,9 @@ class Plan:
                 pose = matrix if pose is None else matrix @ pose
             if motion.shift is not None:
                 shift = shift.index_add(0, level.copies, motion.shift)
-        if source is None:
-            return pose, hand, shift
-        return _some(pose, source), _some(hand, source), shift.index_select(0, source)
+        pose = None if pose is None else pose.index_select(0, source)
+        hand = None if hand is None else hand.index_select(0, source)
+        return pose, hand, shift.index_select(0, source)
 
     def _axes(self, values: Float[Tensor, "R slots"]) -> Float[Tensor, "M 3"]:
         """A point at height zero on the axis about which rotation loops turn each copy, in drawing order."""
@@ -300,10 +299,6 @@ def _copies(
         index.append(remainder % count)
         remainder = remainder.div(count, rounding_mode="floor")
     return row, step[row, 0], torch.stack(index[::-1], -1)
-
-
-def _some(values: Tensor | None, rows: Int[Tensor, " S"]) -> Tensor | None:
-    return None if values is None else values.index_select(0, rows)
 
 
 def _turned(turn: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:

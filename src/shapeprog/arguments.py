@@ -50,14 +50,17 @@ def check_tensor(
     if floating and value.dtype not in (torch.float32, torch.float64):
         raise ShapeProgError(f"{name} holds {value.dtype}", f"give float32 or float64, as {name}.float() does")
     sizes = tuple(value.shape)
-    found = sizes[max(0, len(sizes) - len(shape)) :] if lead else sizes
-    right = (
-        size > 0 or empty if isinstance(one, str) else size == one for size, one in zip(found, shape, strict=False)
+    actual = sizes[max(0, len(sizes) - len(shape)) :] if lead else sizes
+    matches = (
+        size > 0 or empty if isinstance(wanted, str) else size == wanted
+        for size, wanted in zip(actual, shape, strict=False)
     )
-    if len(found) != len(shape) or not all(right):
-        wanted = " x ".join(map(str, ["...", *shape] if lead else shape))
-        letters = "" if empty or all(isinstance(one, int) for one in shape) else ", 1 or more of each letter"
-        raise ShapeProgError(f"{name} has the shape {sizes}", f"give the shape {wanted}{letters}")
+    if len(actual) != len(shape) or not all(matches):
+        expected = " x ".join(map(str, ["...", *shape] if lead else shape))
+        letters = (
+            "" if empty or all(isinstance(dimension, int) for dimension in shape) else ", 1 or more of each letter"
+        )
+        raise ShapeProgError(f"{name} has the shape {sizes}", f"give the shape {expected}{letters}")
 
 
 def check_points(name: str, value: Any) -> None:

@@ -73,9 +73,9 @@ def export_command(
     formats = [written_format(path) for path in outputs]
     loaded, frame = terminal.read_program_file(program, changes)
     terminal.check_free(outputs, overwrite, program)
-    makers = any(chosen.maker for chosen in formats)
-    known = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
-    if frame is not None and makers and not known and SPAN * frame.scale > MOST_METRES:
+    makers = any(file_format.maker for file_format in formats)
+    has_unit = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
+    if frame is not None and makers and not has_unit and SPAN * frame.scale > MOST_METRES:
         terminal.note(terminal.assumed(frame))
     asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
     failures: list[ShapeProgError] = []
@@ -190,10 +190,10 @@ def sheet_command(
         except ShapeProgError as error:
             failures.append(error)
             continue
-        beside, scores, lacking = _input_and_scores(path, frame, shape)
-        if beside is None:
+        input_shape, scores, lacking = _input_and_scores(path, frame, shape)
+        if input_shape is None:
             missing[path.stem] = lacking or "none is named in a .json"
-        items.append(Item(path.stem, beside, loaded, scores_text(scores, loaded)[0]))
+        items.append(Item(path.stem, input_shape, loaded, scores_text(scores, loaded)[0]))
     if not items:
         terminal.finish(failures, terminal.MISTAKE)
     contact_sheet(items, output, columns=columns, title=title)
@@ -234,23 +234,26 @@ def _input_and_scores(
     from shapeprog.formats.json_form import SavedResult, read_result
     from shapeprog.language.program import Program
 
-    kept = not changes and program.suffix.lower() == ".json"
-    result = read_result(program) if kept else SavedResult(Program())
+    is_json = not changes and program.suffix.lower() == ".json"
+    result = read_result(program) if is_json else SavedResult(Program())
     if named is not None and not named.is_dir():
         return _as_inferred(named, frame), result.scores, ""
-    if named is not None and not kept:  # the text may have been edited, so that the scores are of another program
+    if named is not None and not is_json:  # the text may have been edited, so that the scores are of another program
         with suppress(ShapeProgError):
             result = SavedResult(Program(), source=read_result(program.with_suffix(".json")).source)
     if not result.source:
         return None, result.scores, "" if named is None else "no .json of its name beside the program names one"
-    place, mark, member = result.source.partition("#")
+    path, mark, member = result.source.partition("#")
+    recorded = Path(path)
     files = program.parent.iterdir() if named is None else named.rglob("*")
-    same = sorted(file for file in files if file.name == Path(place).name and file.is_file() and not file.is_symlink())
-    agreeing = [_agreeing_parts(file, Path(place)) for file in same]  # others of its name are inputs of other programs
-    if agreeing.count(max(agreeing, default=0)) > 1:
+    candidates = sorted(
+        file for file in files if file.name == recorded.name and file.is_file() and not file.is_symlink()
+    )
+    agreement = [_agreeing_parts(file, recorded) for file in candidates]  # others are inputs of other programs
+    if agreement.count(max(agreement, default=0)) > 1:
         return None, result.scores, "several files have its name, and none fits its path in the .json best"
     try:
-        best = same[agreeing.index(max(agreeing))]
+        best = candidates[agreement.index(max(agreement))]
         return _as_inferred(f"{best}{mark}{member}", frame), result.scores, ""
     except (ValueError, ShapeProgError):
         return None, result.scores, "it was not found, or cannot be read"
@@ -258,7 +261,7 @@ def _input_and_scores(
 
 def _agreeing_parts(file: Path, source: Path) -> int:
     """How many folders and names at the end of two paths are the same."""
-    same = [one == other for one, other in zip(file.absolute().parts[::-1], source.parts[::-1], strict=False)]
+    same = [first == second for first, second in zip(file.absolute().parts[::-1], source.parts[::-1], strict=False)]
     return [*same, False].index(False)
 
 

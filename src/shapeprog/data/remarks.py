@@ -17,8 +17,8 @@ def remark_on_pieces(voxels: BoolArray) -> str:
     pieces, count = label(voxels, np.ones((3, 3, 3)))
     if count < 2:
         return ""
-    least = np.bincount(pieces[voxels])[1:].min() / np.count_nonzero(voxels)
-    text = f"The input has {count} separate pieces, the smallest with {least:.1%} of its cells"
+    smallest = np.bincount(pieces[voxels])[1:].min() / np.count_nonzero(voxels)
+    text = f"The input has {count} separate pieces, the smallest with {smallest:.1%} of its cells"
     return f"{text}: infer objects one by one, and remove geometry that is far from them."
 
 
@@ -28,9 +28,9 @@ def doubt_of_furniture(points: FloatArray, normals: FloatArray) -> str:
     Furniture carries something on level surfaces above the floor, and most of its surfaces face along an axis.
     """
     low, extents, normals = points.min(0), np.maximum(np.ptp(points, axis=0), 1e-9), np.abs(normals)
-    place = (points - low) / extents
-    plan = np.minimum((place[:, 1:] * RESOLUTION).astype(int), RESOLUTION - 1) @ [RESOLUTION, 1]
-    level = (normals[:, UP] > math.cos(math.radians(15))) & (place[:, UP] > 0.1)
+    share = (points - low) / extents
+    plan = np.minimum((share[:, 1:] * RESOLUTION).astype(int), RESOLUTION - 1) @ [RESOLUTION, 1]
+    level = (normals[:, UP] > math.cos(math.radians(15))) & (share[:, UP] > 0.1)
     covered = np.count_nonzero(np.bincount(plan[level])) / np.count_nonzero(np.bincount(plan))
     along = float((normals.max(1) > math.cos(math.radians(10))).mean())
     # Less is true of mugs, bottles, cars and figures, and of 2 % of furniture (val), all of it wire or shells.
@@ -41,12 +41,12 @@ def doubt_of_furniture(points: FloatArray, normals: FloatArray) -> str:
 def remark_on_size(scene: Scene, points: FloatArray) -> str:
     """A sentence about the size of a program if it differs from that of points (P, 3) of its input by more than a
     tenth; else empty."""
-    there, extents = scene.mask.numpy(), np.ptp(points, axis=0)
-    if not there.any():
+    mask, extents = scene.mask.numpy(), np.ptp(points, axis=0)
+    if not mask.any():
         return ""
-    low, high = ((scene.centre + sign * scene.reach).numpy()[there] for sign in (-1, 1))
-    own = high.max(0) - low.min(0)
-    off = np.abs(own - extents) > np.maximum(0.1 * extents, 1.0)  # a sheet has no thickness
-    pairs = zip(np.array(["high", "deep", "wide"])[off], (own / np.maximum(extents, 1e-9))[off], strict=True)
+    low, high = ((scene.centre + sign * scene.reach).numpy()[mask] for sign in (-1, 1))
+    size = high.max(0) - low.min(0)
+    differs = np.abs(size - extents) > np.maximum(0.1 * extents, 1.0)  # a sheet has no thickness
+    pairs = zip(np.array(["high", "deep", "wide"])[differs], (size / np.maximum(extents, 1e-9))[differs], strict=True)
     sizes = " and ".join(f"{ratio:.0%} as {word}" for word, ratio in pairs)
     return sizes and f"The program is {sizes} as the input: parts are missing, or differ from it."

@@ -62,7 +62,7 @@ class Placement(NamedTuple):
 
 
 def placement(
-    chosen: Format,
+    file_format: Format,
     program: Program,
     frame: Frame | None = None,
     *,
@@ -75,7 +75,7 @@ def placement(
 
     Parameters
     ----------
-    chosen
+    file_format
         The format of the file.
     program
         What is written.
@@ -98,47 +98,49 @@ def placement(
     """
     if unit not in ("", CELLS):
         metres(unit)
-    if up and (chosen.axes is None or chosen.unit == CELLS or chosen.kind == "list"):
-        raise InputError(f"--up has no effect on {chosen.suffixes[0]}", "leave it out")
-    if chosen.axes is None:
+    if up and (file_format.axes is None or file_format.unit == CELLS or file_format.kind == "list"):
+        raise InputError(f"--up has no effect on {file_format.suffixes[0]}", "leave it out")
+    if file_format.axes is None:
         return Placement(frame)
-    if chosen.unit == CELLS:
+    if file_format.unit == CELLS:
         if unit:
-            raise InputError(f"--unit has no effect on {chosen.suffixes[0]}", "its lengths are in cells")
+            raise InputError(f"--unit has no effect on {file_format.suffixes[0]}", "its lengths are in cells")
         return Placement(Frame())
     if up and up.removeprefix("+") not in BY_UP:
         raise InputError(f"{up!r} is no axis that points up", "use x, y or z")
     if up and on_input:
         raise InputError("--on-input takes the axes of the input, --up another one", "give one of them")
-    if on_input and frame is None and chosen.kind != "list":
+    if on_input and frame is None and file_format.kind != "list":
         raise InputError("the program does not say how its input lies", "export a program that infer has written")
     if on_input is None:
-        on_input = not chosen.maker
-    per_cell, name = _cell_size(chosen, program, frame, unit, file_unit)
+        on_input = not file_format.maker
+    per_cell, name = _cell_size(file_format, program, frame, unit, file_unit)
     if frame is not None and on_input and not up:
-        if not unit and chosen.unit != "text":
+        if not unit and file_format.unit != "text":
             return Placement(frame)
         centre = per_cell / frame.scale * np.array(frame.centre)
         return Placement(Frame.of(per_cell, centre, np.array(frame.axes)), name)
-    matrix = grid_axes(*(BY_UP[up.removeprefix("+")] if up else chosen.axes))
-    centre = -per_cell * (matrix @ _ground(program, chosen.rests)) + 0.0 if chosen.maker else np.zeros(3)
+    matrix = grid_axes(*(BY_UP[up.removeprefix("+")] if up else file_format.axes))
+    centre = -per_cell * (matrix @ _ground(program, file_format.rests)) + 0.0 if file_format.maker else np.zeros(3)
     return Placement(Frame.of(per_cell, centre, matrix), name)
 
 
-def _cell_size(chosen: Format, program: Program, frame: Frame | None, unit: str, file_unit: str) -> tuple[float, str]:
+def _cell_size(
+    file_format: Format, program: Program, frame: Frame | None, unit: str, file_unit: str
+) -> tuple[float, str]:
     """The size of a cell in a file, and the unit that it is in, empty if it is not known."""
     if unit == CELLS:
         return 1.0, ""
-    per_cell, known = _real_size(program, frame, file_unit)
-    wanted = unit or chosen.unit
-    if wanted == "text":
-        wanted = known if frame is None or (program.unit and program.unit.name) else "mm"
-    if not wanted:
-        return (per_cell, known) if frame is None else (frame.scale, "")
-    if known:
-        return per_cell * (metres(known) / metres(wanted)), wanted
+    per_cell, source_unit = _real_size(program, frame, file_unit)
+    target_unit = unit or file_format.unit
+    if target_unit == "text":
+        target_unit = source_unit if frame is None or (program.unit and program.unit.name) else "mm"
+    if not target_unit:
+        return (per_cell, source_unit) if frame is None else (frame.scale, "")
+    if source_unit:
+        return per_cell * (metres(source_unit) / metres(target_unit)), target_unit
     if unit:
-        raise InputError(f"cannot write {' '.join(chosen.suffixes)} in {unit}: {_UNKNOWN}", _CURE)
+        raise InputError(f"cannot write {' '.join(file_format.suffixes)} in {unit}: {_UNKNOWN}", _CURE)
     return per_cell, ""
 
 
@@ -165,11 +167,11 @@ def asked_unit(program: Program, frame: Frame | None, unit: str | None, file_uni
     if unit == CELLS:
         return None
     metres(unit)
-    per_cell, known = _real_size(program, frame, file_unit)
-    if not known:
+    per_cell, source_unit = _real_size(program, frame, file_unit)
+    if not source_unit:
         in_cells = f"statements in cells have no size: infer the object with --unit {unit}"
         raise InputError(f"cannot write {path} in {unit}: {_UNKNOWN}", _CURE if program.unit else in_cells)
-    return Unit(unit, per_cell * metres(known) / metres(unit))
+    return Unit(unit, per_cell * metres(source_unit) / metres(unit))
 
 
 def _ground(program: Program, rests: bool) -> FloatArray:
@@ -233,9 +235,9 @@ def frame_comment(frame: Frame | None, program: Program) -> str:
         cure = "its scale must be above 0, its centre finite and its axes a rotation"
         raise OutputError(f"{frame} cannot be stored with a program", cure)
     scale = scale_of(program)
-    text, own = frame_of_text(frame, scale), "" if program.unit is None else program.unit.name
+    text, unit_name = frame_of_text(frame, scale), "" if program.unit is None else program.unit.name
     size = f"{text.scale:.8g}"
-    factors = {name: METRES[own] / length for name, length in METRES.items()} if own else {"": 1.0}
+    factors = {name: METRES[unit_name] / length for name, length in METRES.items()} if unit_name else {"": 1.0}
     for name, factor in factors.items():
         if math.isclose(factor, text.scale, rel_tol=2e-7):
             size = f"{factor:.8g} {name}".rstrip()

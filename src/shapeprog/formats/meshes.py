@@ -51,11 +51,11 @@ def glb(program: Program, frame: Frame) -> bytes:
     make_visual: Any = trimesh.visual.TextureVisuals
     scene: Any = trimesh.Scene()
     materials: dict[str, Any] = {}
-    each = drawn_parts(program, frame)
-    if len(each) > MOST_NODES:
-        message = f"the {len(each)} parts of this program are too many named nodes: a GLB takes at most {MOST_NODES}"
+    solids = drawn_parts(program, frame)
+    if len(solids) > MOST_NODES:
+        message = f"the {len(solids)} parts of this program are too many named nodes: a GLB takes at most {MOST_NODES}"
         raise OutputError(message, "lower the counts, or export .ply, which has all parts in one mesh")
-    for part, of_corners in zip(each, part_normals(each), strict=True):
+    for part, of_corners in zip(solids, part_normals(solids), strict=True):
         if part.word not in materials:
             materials[part.word] = make_material(
                 name=part.word, baseColorFactor=[*colour(part.word), 255], metallicFactor=0.0, roughnessFactor=0.7
@@ -69,15 +69,15 @@ def glb(program: Program, frame: Frame) -> bytes:
 
 def obj(program: Program, frame: Frame, stem: str) -> dict[str, str]:
     """One named object per part; its colours in an ``.mtl`` file of the same name beside it."""
-    each = drawn_parts(program, frame)
+    solids = drawn_parts(program, frame)
     lines, first = [f"mtllib {stem}.mtl"], 1
-    for part in each:
+    for part in solids:
         lines += [f"o {part.name}", f"usemtl {part.word}"]
         lines += ["v {:.12g} {:.12g} {:.12g}".format(*vertex) for vertex in part.vertices.tolist()]
         lines += ["f {} {} {}".format(*face) for face in (part.faces + first).tolist()]
         first += len(part.vertices)
     materials = []
-    for word in dict.fromkeys(part.word for part in each):
+    for word in dict.fromkeys(part.word for part in solids):
         materials.append("newmtl {}\nKd {:.4f} {:.4f} {:.4f}\n".format(word, *(c / 255 for c in colour(word))))
     return {".mtl": "\n".join(materials), ".obj": "\n".join([*lines, ""])}
 
@@ -86,9 +86,9 @@ def ply(program: Program, frame: Frame) -> bytes:
     """All parts in one mesh with a colour at each vertex; parts overlap as they do in the program."""
     import trimesh
 
-    each = drawn_parts(program, frame)
-    colours = [np.tile([*colour(part.word), 255], (len(part.vertices), 1)) for part in each]
-    vertices, faces = joined([(part.vertices, part.faces) for part in each])
+    solids = drawn_parts(program, frame)
+    colours = [np.tile([*colour(part.word), 255], (len(part.vertices), 1)) for part in solids]
+    vertices, faces = joined([(part.vertices, part.faces) for part in solids])
     mesh: Any = trimesh.Trimesh(vertices, faces, vertex_colors=np.concatenate(colours).astype(np.uint8), process=False)
     return mesh.export(file_type="ply")
 

@@ -114,10 +114,10 @@ sample = sample_surface  # its public name, shapeprog.sample
 def face_areas(flat: Batch) -> Float[Tensor, "B N F"]:
     """Area of every face of every slot, zero where there is none."""
     slots = [(kind, (flat.mask & (flat.kind == kind)).nonzero(as_tuple=True)) for kind in flat.kinds]
-    found = [primitives[kind].areas(flat.size[selected]) for kind, selected in slots]
-    width = max((item.shape[-1] for item in found), default=1)
+    kind_areas = [primitives[kind].areas(flat.size[selected]) for kind, selected in slots]
+    width = max((item.shape[-1] for item in kind_areas), default=1)
     areas = flat.size.new_zeros(*flat.mask.shape, width)
-    for (_, selected), item in zip(slots, found, strict=True):
+    for (_, selected), item in zip(slots, kind_areas, strict=True):
         areas = areas.index_put(selected, torch.nn.functional.pad(item, (0, width - item.shape[-1])))
     return areas
 

@@ -155,5 +155,5 @@ def _ends(box: Box, axis: int) -> tuple[FloatArray, FloatArray]:
 
 def _radius(box: Box, axis: int) -> float:
     """Radius of the section across an axis; none where it is not nearly square."""
-    small, large = sorted(box.half[other] for other in range(3) if other != axis)
+    small, large = sorted(box.half[across] for across in range(3) if across != axis)
     return float((small + large) / 2) if small >= ROUND * large else 0.0

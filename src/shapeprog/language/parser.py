@@ -57,23 +57,23 @@ def parse(text: str, name: str = "<program>") -> Program:
     ProgramError
         With line and column of a mistake, and the nearest name or what is allowed.
     """
-    whole = Text(text, name)
-    tree = whole.tree()
-    if _is_in_cells(tree) and (tree.body or not any(map(_UNIT.fullmatch, whole.lines))):
-        return parse_cells(whole, tree)
-    unit, lines = _unit(whole, tree)
-    reader = _Reader(whole, tree, Comments(lines))
+    source = Text(text, name)
+    tree = source.tree()
+    if _is_in_cells(tree) and (tree.body or not any(map(_UNIT.fullmatch, source.lines))):
+        return parse_cells(source, tree)
+    unit, lines = _unit(source, tree)
+    reader = _Reader(source, tree, Comments(lines))
     try:
         body = reader.lines()
         if not reader.has_whole:
-            raise whole.at(1, 1, "the program does not declare its size", BEGIN)
-        stray = [] if unit else [row for row, line in enumerate(whole.lines, 1) if _LIKE_UNIT.match(line)]
+            raise source.at(1, 1, "the program does not declare its size", BEGIN)
+        stray = [] if unit else [row for row, line in enumerate(source.lines, 1) if _LIKE_UNIT.match(line)]
         warnings = [f"line {row}: this comment sets no unit; write # unit: cm above all other lines" for row in stray]
         return evaluated(placed_source(body, unit, (*reader.warnings(), *warnings)))
     except Fault as fault:
         raise reader.located(fault) from None
     except RecursionError:
-        raise whole.at(1, 1, "the program is nested too deeply", "use fewer levels") from None
+        raise source.at(1, 1, "the program is nested too deeply", "use fewer levels") from None
 
 
 def _is_in_cells(tree: ast.Module) -> bool:
@@ -217,8 +217,8 @@ class _Reader(Reader):
         if word in self.function_names and word not in self.functions:
             raise self.error(call, f"{word} calls itself", "use a loop: functions call only those above them")
         if word not in self.functions:
-            known = {*IN_BOX, *BETWEEN, *roles, *self.functions}
-            hint = did_you_mean(word, sorted(known), "'shapeprog statements' lists all; functions stand above calls")
+            names = {*IN_BOX, *BETWEEN, *roles, *self.functions}
+            hint = did_you_mean(word, sorted(names), "'shapeprog statements' lists all; functions stand above calls")
             raise self.error(call, f"unknown part {word or self.text.shown(call)!r}", hint)
         return ""
 

@@ -118,10 +118,10 @@ class Reader(ABC):
                 not block.depth, node, "a name is declared inside a loop or a group", "move this line above it"
             )
             return self._assignment(node, block.scope, block.local)
-        known = isinstance(node, ast.For | ast.With | ast.FunctionDef)
-        known = known or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call))
+        is_legal = isinstance(node, ast.For | ast.With | ast.FunctionDef)
+        is_legal = is_legal or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call))
         hint = "use a part, a loop, with inside(...), a function or name = number"
-        self.require(known, node, "this is no statement of a program", hint)
+        self.require(is_legal, node, "this is no statement of a program", hint)
         self.require(self.has_whole, node, "the size is not declared yet", BEGIN)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             return self.element(node.value, block.scope)
@@ -155,20 +155,20 @@ class Reader(ABC):
 
     def declare(self, word: str, node: Node, scope: Names, parameter: bool = False) -> None:
         """Add a name to a scope; a parameter may hide a name of the program."""
-        taken = not parameter and (word in scope or word in self.functions)
-        self.require(not taken, node, f"{word!r} is declared twice", "use another name")
-        free = not is_reserved(word) or (self.declares_whole and word in SIZES and not parameter)
-        free = free and not (parameter and word == "tilt")  # a call takes tilt itself
+        is_taken = not parameter and (word in scope or word in self.functions)
+        self.require(not is_taken, node, f"{word!r} is declared twice", "use another name")
+        is_free = not is_reserved(word) or (self.declares_whole and word in SIZES and not parameter)
+        is_free = is_free and not (parameter and word == "tilt")  # a call takes tilt itself
         hint = "width, depth, height = ... is one line" if word in SIZES else f"use another name, such as {word}_size"
-        self.require(free, node, f"{word!r} is a word of the language", hint)
+        self.require(is_free, node, f"{word!r} is a word of the language", hint)
         scope[word] = Declared(node, used=word in SIZES)  # the sizes of the whole always count as used
         self.declared.append((word, scope[word]))
 
     def _function(self, node: ast.FunctionDef, end: float) -> Line:
         """A function, which is known below its definition only, so that there is no recursion."""
         head, name = node.args, node.name
-        taken = is_reserved(name) or name in ATTRIBUTES or name in self.functions or name in self.names
-        self.require(not taken, node, f"{name!r} has a meaning already", "use another name")
+        is_taken = is_reserved(name) or name in ATTRIBUTES or name in self.functions or name in self.names
+        self.require(not is_taken, node, f"{name!r} has a meaning already", "use another name")
         extra = [head.posonlyargs, head.vararg, head.kwonlyargs, head.kwarg, node.decorator_list, node.returns]
         extra += [*(argument.annotation for argument in head.args), getattr(node, "type_params", None)]
         self.require(not any(extra), node, "parameters are name or name=number", "remove the rest")
@@ -226,8 +226,8 @@ class Reader(ABC):
         for name in value.names() if isinstance(value, Expression) else ():
             if name.name not in scope:
                 otherwise = f"declare it above: {name.name} = ..."
-                near = did_you_mean(name.name, scope, " ").strip()
-                hint = f"{near} or {otherwise}" if near else otherwise
+                suggestion = did_you_mean(name.name, scope, " ").strip()
+                hint = f"{suggestion} or {otherwise}" if suggestion else otherwise
                 if is_reserved(name.name):
                     hint = f"{name.name} is a word of the language, not a number"
                 if name.name in SIZES:

@@ -67,8 +67,8 @@ class Language:
             raise DeclarationError(message, hint)
         if not declared.ships:
             check_declaration(declared)
-        others = {number: known for number, known in self._by_id.items() if known is not replaced}
-        self._by_id = dict(sorted({**others, declared.id: declared}.items()))
+        remaining = {number: entry for number, entry in self._by_id.items() if entry is not replaced}
+        self._by_id = dict(sorted({**remaining, declared.id: declared}.items()))
         self._by_name[declared.name] = declared
         self.version = next(_versions)
         return declared
@@ -79,11 +79,11 @@ class Language:
         Cells and lines typed at a prompt are in no file.
         """
         old = self._by_name.get(name)
-        codes = [getattr(each, "__code__", None) for each in (old and (old.draw or old.move), function)]
+        codes = [getattr(source, "__code__", None) for source in (old and (old.draw or old.move), function)]
         if old is None or old.ships or None in codes:
             return None
-        places = {(code.co_filename, code.co_firstlineno) for code in codes if code}
-        return old if len(places) == 1 or not any(os.path.exists(file) for file, _ in places) else None
+        locations = {(code.co_filename, code.co_firstlineno) for code in codes if code}
+        return old if len(locations) == 1 or not any(os.path.exists(file) for file, _ in locations) else None
 
     def add_role(self, name: str, doc: str, label: str = "") -> Role:
         """Add a role and return it; a ``DeclarationError`` if there is another one, or a loop, of this name.
@@ -130,9 +130,9 @@ class Language:
 
     def _faults(self, declared: Statement, replaced: Statement | None) -> Iterator[tuple[str, str]]:
         """The mistakes in a declaration, found without drawing it, each with its cure."""
-        others = [known for known in self if known is not replaced]
+        remaining = [entry for entry in self if entry is not replaced]
         what = f"statement {declared.name!r}"
-        owners = dict.fromkeys((EMPTY, END), "the language itself") | {known.id: known.name for known in others}
+        owners = dict.fromkeys((EMPTY, END), "the language itself") | {entry.id: entry.name for entry in remaining}
         roles = [role for role in self.roles.values() if replaced is None or role.name != replaced.name]
         owners = {role.id: f"the role {role.name}" for role in roles} | owners
         if not is_word(declared.name):

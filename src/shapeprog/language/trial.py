@@ -39,8 +39,8 @@ def check_declaration(declared: Statement) -> None:
                 assert declared.draw is not None
                 for numbers, lead in ((named, (2,)), (declared.split(values[0]), ())):
                     result = declared.draw(**numbers)
-                    for each in [result] if isinstance(result, Solids | None) else list(result):
-                        solids = _checked(each, Solids)
+                    for drawn in [result] if isinstance(result, Solids | None) else list(result):
+                        solids = _checked(drawn, Solids)
                         parts += [(solids.size, (*lead, SIZES)), (solids.centre, (*lead, 3))]
                         parts.append((solids.rotation, (*lead, 3, 3)))
                 if parts and declared.pivot is not None:

@@ -186,7 +186,8 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         best = f"; the best on validation: {folder / BEST}" if (folder / BEST).exists() else ""
         terminal.say(f"the weights are {folder / WEIGHTS}{best}")
 
-    signature = [each for each in inspect.signature(run, eval_str=True).parameters.values() if each.name != "options"]
+    parameters = inspect.signature(run, eval_str=True).parameters.values()
+    signature = [parameter for parameter in parameters if parameter.name != "options"]
     hints, bases = get_type_hints(kind), [base for base in reversed(kind.__mro__) if is_dataclass(base)]
     meanings = {field.name: field.metadata["help"] for base in bases for field in fields(base) if field.metadata}
     for field in fields(kind):
@@ -195,7 +196,7 @@ def _add_training(name: str, kind: type[Any], task: str, doc: str) -> None:
         option = Annotated[hint | None, typer.Option(help=meanings[field.name] + default)]
         signature.append(inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option))
     run.__signature__ = inspect.Signature(signature)  # type: ignore[attr-defined]
-    run.__annotations__ = {each.name: each.annotation for each in signature}
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in signature}
     app.command(name, help=doc)(terminal.guarded(run))
 
 

@@ -78,11 +78,11 @@ def teacher_forcing(target: UInt8[Tensor, "B 32 32 32"], code: Code, order: Orde
     code = Code(pad(code.ids, (0, 0, 0, 1)), pad(code.parameters, (0, 0, 0, 0, 0, 1)))
     drawn = draw_blocks(code)
     if order == "coverage":
-        canvas, chosen = torch.zeros_like(drawn[:, :1]), []
+        canvas, blocks = torch.zeros_like(drawn[:, :1]), []
         for _ in range(drawn.shape[1]):
-            chosen.append(_best(drawn, canvas))
-            canvas = canvas | drawn.gather(1, chosen[-1][0][..., None, None].expand_as(canvas))
-        block, adds = (torch.cat(part, 1) for part in zip(*chosen, strict=True))
+            blocks.append(_best(drawn, canvas))
+            canvas = canvas | drawn.gather(1, blocks[-1][0][..., None, None].expand_as(canvas))
+        block, adds = (torch.cat(part, 1) for part in zip(*blocks, strict=True))
         code, drawn = take(code, block, adds), drawn.gather(1, block[..., None, None].expand_as(drawn))
     return TeacherForcingBatch(target, preceding(drawn), preceding_blocks(code), code, live_blocks(code.ids))
 

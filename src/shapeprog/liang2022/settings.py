@@ -46,16 +46,16 @@ class TrainingSettings:
             if get_origin(hints[name]) is Literal and value not in get_args(hints[name]):
                 raise ShapeProgError(f"unknown {name} {value!r}", f"choose one of {', '.join(get_args(hints[name]))}")
             if hints[name] in (int, float, float | None):
-                least, most = name in AT_LEAST_ONE, 1 if name in SHARES else math.inf
-                check_number(name, value, least, most, whole=hints[name] is int)
+                low, high = name in AT_LEAST_ONE, 1 if name in SHARES else math.inf
+                check_number(name, value, low, high, whole=hints[name] is int)
             else:
-                given = value if isinstance(value, list | tuple) else (value,)
-                several = get_origin(hints[name]) is tuple
-                texts = tuple(os.fspath(one) if isinstance(one, os.PathLike) else one for one in given)
-                if several == (given is not value) or not all(isinstance(one, str) for one in texts):
-                    wanted = "tuple of paths, such as ('x.npz',)" if several else "text"
-                    raise ShapeProgError(f"{name} is {value!r}", f"give a {wanted}")
-                object.__setattr__(self, name, texts if several else texts[0])
+                items = value if isinstance(value, list | tuple) else (value,)
+                is_tuple = get_origin(hints[name]) is tuple
+                texts = tuple(os.fspath(item) if isinstance(item, os.PathLike) else item for item in items)
+                if is_tuple == (items is not value) or not all(isinstance(item, str) for item in texts):
+                    expected = "tuple of paths, such as ('x.npz',)" if is_tuple else "text"
+                    raise ShapeProgError(f"{name} is {value!r}", f"give a {expected}")
+                object.__setattr__(self, name, texts if is_tuple else texts[0])
         if self.beta1 == 1:
             raise ShapeProgError("beta1 is 1", "give a number of 0 or more, below 1")
 

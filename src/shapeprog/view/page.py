@@ -198,7 +198,7 @@ def _views(shape: Shape | None, drawn: Sequence[Part], width: int, height: int) 
     models = [*([] if shape is None else [of_shape(shape)]), of_parts(drawn)]
     camera = camera_for(models, width / height)
     with ThreadPoolExecutor(2) as pool:
-        return [Image.fromarray(each) for each in pool.map(lambda model: render(model, camera, width, height), models)]
+        return [Image.fromarray(view) for view in pool.map(lambda model: render(model, camera, width, height), models)]
 
 
 def _line(draw: ImageDraw, corner: tuple[float, float], line: Row, size: int, advance: float) -> None:

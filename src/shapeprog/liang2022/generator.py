@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
+from itertools import accumulate
+from operator import or_
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import torch
@@ -216,15 +218,10 @@ def take(code: Code, block: Int[Tensor, "B L"], keep: Bool[Tensor, "B L"]) -> Co
 
 def union(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch words R"]:
     """The packed cells of all parts together."""
-    cells = torch.zeros_like(parts[..., 0, :, :])
-    for part in parts.unbind(-3):
-        cells |= part
-    return cells
+    return reduce(or_, parts.unbind(-3))
 
 
 def preceding(parts: Int[Tensor, "*batch K words R"]) -> Int[Tensor, "*batch K words R"]:
     """For each part, the cells of all parts before it."""
-    cells = torch.zeros_like(parts)
-    for k in range(1, parts.shape[-3]):
-        cells[..., k, :, :] = cells[..., k - 1, :, :] | parts[..., k - 1, :, :]
-    return cells
+    nothing = torch.zeros_like(parts[..., 0, :, :])
+    return torch.stack([*accumulate(parts[..., :-1, :, :].unbind(-3), or_, initial=nothing)], -3)

@@ -24,7 +24,7 @@ from shapeprog.files import check_file
 from shapeprog.formats.format import suffixes
 from shapeprog.formats.shape import read_text
 from shapeprog.language.unit import metres
-from shapeprog.space import Array, Frame, axis_name
+from shapeprog.space import Frame, axis_name
 
 ARRAY_SUFFIXES = frozenset({".xyz", ".npy", ".npz", ".h5", ".hdf5"})
 """Suffixes of files that hold arrays of points or voxels."""
@@ -184,9 +184,17 @@ def _open(path: Path, up: str | None, front: str | None, points: int, seed: int)
         if suffix in ARRAY_SUFFIXES:
             return _open_array(path, name, make_shape, points, seed)
         if suffix == ".binvox":
-            shape = _read_binvox(path, name, make_shape)
+            from shapeprog.data.binvox import read_binvox
+
+            check_count(path.name, "bytes", path.stat().st_size, BYTES)
+            cells, corner, cell = read_binvox(path)
+            shape = make_shape(partial(shape_from_voxels, cells, name=name, corner=corner, cell=cell, source=path))
         else:
-            shape = _shape_of(*read_mesh(path), path, name, make_shape, points, seed)
+            vertices, faces = read_mesh(path)
+            if not len(faces):
+                check_count(path.name, "points", len(vertices), POINTS)
+            make = partial(shape_from_mesh, faces=faces) if len(faces) else shape_from_points
+            shape = make_shape(partial(make, vertices, name=name, points=points, seed=seed, source=path))
     return _Held(path, [name], lambda _: shape)
 
 
@@ -212,21 +220,6 @@ def placed(path: Path, up: str | None, front: str | None, make: Callable[..., Sh
     note = f"Estimated up axis of the file: {estimate.up} (probability {estimate.probability:.0%}){doubt}."
     shape = make(axes=axes_of(path, estimate.up, front, cloud))
     return replace(shape, note=f"{note} {shape.note}".rstrip())
-
-
-def _read_binvox(path: Path, name: str, make_shape: Place) -> Shape:
-    from shapeprog.data.binvox import read_binvox
-
-    check_count(path.name, "bytes", path.stat().st_size, BYTES)
-    cells, corner, cell = read_binvox(path)
-    return make_shape(partial(shape_from_voxels, cells, name=name, corner=corner, cell=cell, source=path))
-
-
-def _shape_of(vertices: Array, faces: Array, path: Path, name: str, make_shape: Place, points: int, seed: int) -> Shape:
-    if len(faces):
-        return make_shape(partial(shape_from_mesh, vertices, faces, name=name, points=points, seed=seed, source=path))
-    check_count(path.name, "points", len(vertices), POINTS)
-    return make_shape(partial(shape_from_points, vertices, name=name, points=points, seed=seed, source=path))
 
 
 def _open_array(path: Path, name: str, make_shape: Place, points: int, seed: int) -> _Held:

@@ -16,7 +16,6 @@ from shapeprog.errors import InputError
 from shapeprog.space import Array
 
 _HEAD = 4096  # most bytes of a header
-_AT_ONCE = 1 << 16  # runs unpacked at once: numpy takes eight bytes for the length of each
 
 _CURE = "write the file again; binvox files start with '#binvox 1' and hold runs of 0 and 1"
 
@@ -46,9 +45,5 @@ def read_binvox(path: str | os.PathLike[str]) -> tuple[Array, Array, float]:
         raise InputError(f"{name} holds {held} cells where its head says {total}: it is cut short or damaged", _CURE)
     if (values > 1).any():
         raise InputError(f"{name} holds cells with the value {values.max()}; only 0 and 1 have a meaning", _CURE)
-    cells, at = np.empty(total, np.bool_), 0
-    for start in range(0, len(lengths), _AT_ONCE):
-        some = np.repeat(values[start : start + _AT_ONCE].view(np.bool_), lengths[start : start + _AT_ONCE])
-        cells[at : at + len(some)] = some
-        at += len(some)
+    cells = np.repeat(values.astype(np.bool_), lengths)
     return cells.reshape(shape).transpose(0, 2, 1), corner, scale / shape[0]

@@ -39,8 +39,6 @@ INKS = np.array([1.0, 0.45, 0.16, 0.1])
 
 GAMMA = 2.2
 
-_AT_ONCE = 1 << 18  # points projected at once: meshes may have millions
-
 
 @dataclass(frozen=True)
 class Camera:
@@ -90,12 +88,10 @@ def camera_for(models: Sequence[Model], aspect: float = 1.0) -> Camera:
     eye = centre + DISTANCE * span * back
     first, last, farthest = np.full(2, np.inf), np.full(2, -np.inf), 0.0
     for cloud in clouds:
-        for start in range(0, len(cloud), _AT_ONCE):
-            points = cloud[start : start + _AT_ONCE]
-            offset = points - eye
-            slopes = offset @ np.stack([right, up], 1) / (offset @ -back)[:, None]
-            first, last = np.minimum(first, slopes.min(0)), np.maximum(last, slopes.max(0))
-            farthest = max(farthest, float(np.linalg.norm(points, axis=1).max()))
+        offset = cloud - eye
+        slopes = offset @ np.stack([right, up], 1) / (offset @ -back)[:, None]
+        first, last = np.minimum(first, slopes.min(0)), np.maximum(last, slopes.max(0))
+        farthest = max(farthest, float(np.linalg.norm(cloud, axis=1).max()))
     extent = np.maximum(last - first, 1e-6)
     focal = (1 - 2 * MARGIN) * min(1 / extent[0], 1 / (aspect * extent[1]))
     radius = farthest * 1.02 + 0.5

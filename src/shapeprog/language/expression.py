@@ -20,6 +20,8 @@ from shapeprog.language.parameters import shortest, to_float32
 
 Operator = Literal["+", "-", "*", "/"]
 
+Method: TypeAlias = "Callable[[Expression, Value], Expression]"
+
 APPLY = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 _LEVEL = {"+": 1, "-": 1, "*": 2, "/": 2}  # how tightly they bind; a sign binds at 3, a number or a name at 4
 
@@ -30,6 +32,11 @@ class ExpressionError(ShapeProgError):
     def __init__(self, expression: Expression, message: str, hint: str) -> None:
         super().__init__(message, hint)
         self.expression = expression
+
+
+def _operators(sign: Operator) -> tuple[Method, Method]:
+    """The methods of an operator with an expression on its left, and on its right."""
+    return lambda left, right: Binary(sign, left, right), lambda right, left: Binary(sign, left, right)
 
 
 class Expression:
@@ -45,29 +52,10 @@ class Expression:
         """The names in it, in the order of its text, with repetitions."""
         raise NotImplementedError
 
-    def __add__(self, other: Value) -> Expression:
-        return Binary("+", self, other)
-
-    def __radd__(self, other: float) -> Expression:
-        return Binary("+", other, self)
-
-    def __sub__(self, other: Value) -> Expression:
-        return Binary("-", self, other)
-
-    def __rsub__(self, other: float) -> Expression:
-        return Binary("-", other, self)
-
-    def __mul__(self, other: Value) -> Expression:
-        return Binary("*", self, other)
-
-    def __rmul__(self, other: float) -> Expression:
-        return Binary("*", other, self)
-
-    def __truediv__(self, other: Value) -> Expression:
-        return Binary("/", self, other)
-
-    def __rtruediv__(self, other: float) -> Expression:
-        return Binary("/", other, self)
+    __add__, __radd__ = _operators("+")
+    __sub__, __rsub__ = _operators("-")
+    __mul__, __rmul__ = _operators("*")
+    __truediv__, __rtruediv__ = _operators("/")
 
     def __neg__(self) -> Expression:
         return Negative(self)

@@ -22,7 +22,7 @@ PINNED = [
         "t.shape, line 1, column 1: unknown statement 'legg'\n"
         "  legg(at=(1, 2, 3), size=(1, 2, 3))\n"
         "  ^\n"
-        "  hint: did you mean leg?",
+        "  hint: did you mean leg? A statement of your own needs --with, in Python sp.load_statements.",
     ),
     (
         f"{LEG}\nleg(at=(1, 2, 3), sise=(1, 2, 3))",
@@ -277,9 +277,9 @@ def test_numbers_without_names_behind_those_with_names_are_told_in_our_words() -
 
 def test_a_list_of_programs_has_no_text() -> None:
     programs = decode(encode(parse("leg(at=(1, 2, 3), size=(1, 1, 1))")))
-    with pytest.raises(ShapeProgError, match="takes one program, not a list") as caught:
+    with pytest.raises(ShapeProgError, match="is no program") as caught:
         format_program(programs)  # type: ignore[arg-type]
-    assert "format each" in caught.value.hint
+    assert "sp.decode returns several" in caught.value.hint
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,9 @@ def shape_from_voxels(
 ) -> Shape:
     """The shape of a voxel grid (R, R, R) of booleans, or of 0 and 1, whose cells have the side 1 of a unit.
 
+    Other grids than 32 x 32 x 32 are resampled to that, where a part may be up to a cell of it thinner or thicker; a
+    mesh, as marching cubes make one, keeps fine grids exact.
+
     By default the axes of the array are those of the grid: up, to the rear, left.  All else is as for
     :func:`shapeprog.shape_from_mesh`.
     """
@@ -109,7 +112,8 @@ def _numbers(name: str, value: Any, dimensions: int) -> Array:
     """Points (P, 3) in float64, or a grid (R, R, R)."""
     array = _array(name, value)
     if array.ndim != dimensions:
-        wanted = "(P, 3)" if dimensions == 2 else "(R, R, R)"
-        raise InputError(f"{name} is an array of shape {array.shape}", f"give the shape {wanted}")
+        cure = f"give the shape {'(P, 3)' if dimensions == 2 else '(R, R, R)'}"
+        cure = cure if array.ndim else "give an array; sp.load_shape reads files, and meshes have .vertices and .faces"
+        raise InputError(f"{name} is {f'an array of shape {array.shape}' if array.ndim else repr(value)}", cure)
     numbers = checked(array, name)
     return numbers if dimensions == 2 else numbers[0]

@@ -22,7 +22,7 @@ IN_METRES, IN_MILLIMETRES = (".glb", ".gltf"), (".stl", ".3mf")
 _CURE = "make the shape with sp.shape_from_mesh, sp.shape_from_points or sp.shape_from_voxels"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Shape:
     """A shape in the grid frame: centred, its longest side 24 cells, axes up, depth and left-right.
 
@@ -84,7 +84,7 @@ class Shape:
         """Its name and kind, how much it holds, and its longest side in the world, in one line."""
         counts = {"points": self.points, "faces": self.faces}
         held = [f"{len(array):,} {name}" for name, array in counts.items() if array is not None]
-        size = f"longest side {SPAN * self.frame.scale:.4g} {self.file_unit}".rstrip()
+        size = f"longest side {SPAN * self.frame.scale:.4g} {self.file_unit if self.states_unit else ''}".rstrip()
         return f"<Shape {self.name!r}: {', '.join([self.kind, *held, f'{self.voxels.sum():,} cells', size])}>"
 
     @property

@@ -10,7 +10,7 @@ from shapeprog.errors import InputError, OutputError, did_you_mean
 from shapeprog.files import write_bytes
 from shapeprog.formats.format import Format, format_of, listed, program_suffixes, suffixes
 from shapeprog.formats.frames import asked_unit, placement
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, check_program
 from shapeprog.space import Frame
 
 
@@ -139,6 +139,7 @@ def export(
     OutputError
         If the suffix is unknown, the program draws nothing that the format can hold, or the file cannot be written.
     """
+    check_program(program)
     target = Path(path)
     file_format, suffix = written_format(target), target.suffix.lower()
     if file_format.kind == "program" and unit:

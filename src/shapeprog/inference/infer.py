@@ -153,7 +153,7 @@ def infer(
         If there is no such unit, or another argument has no meaning.
     """
     check_unit(unit)
-    check_number("blocks", blocks, 0, whole=True)
+    check_number("blocks", blocks, 1, whole=True)
     check_number("detail", detail, 0, above=True)
     check_number("seed", seed, 0, MOST_SEED, whole=True)
     check_number("budget", budget, 0, endless=True)

@@ -89,6 +89,8 @@ class _Reader:
             fitting = [declared.name for declared in registry if declared.is_loop == (kind == "loop")]
             fitting += [] if kind == "loop" else registry.roles
             hint = did_you_mean(function.id, fitting)
+            if kind == "statement":
+                hint += " A statement of your own needs --with, in Python sp.load_statements."
             raise self.text.error(function, f"unknown {kind} {function.id!r}", hint)
         declared = registry[function.id]
         if not isinstance(node, ast.Call):

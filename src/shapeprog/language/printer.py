@@ -29,7 +29,7 @@ from shapeprog.language.ast import (
 )
 from shapeprog.language.expression import Value, text_of
 from shapeprog.language.placement import ROUND_ROLES
-from shapeprog.language.program import DEEPEST, Draw, Node, Program
+from shapeprog.language.program import DEEPEST, Draw, Node, Program, check_program
 from shapeprog.language.statement import language
 from shapeprog.language.text import LONGEST
 from shapeprog.language.unit import HEAD
@@ -44,9 +44,6 @@ def format_program(program: Program) -> str:
     a number is not finite, a statement is not declared or has more or fewer, or the text would be longer, or its loops
     deeper, than can be read back.
     """
-    if not isinstance(program, Program):
-        message = f"format_program takes one program, not a {type(program).__name__}"
-        raise ShapeProgError(message, "sp.decode returns a list of programs: format each of them")
     return format_source(source_of(program))
 
 
@@ -71,6 +68,7 @@ def printed(source: Source) -> list[tuple[str, Line | None]]:
 
 def source_of(program: Program) -> Source:
     """A program as it is written; one without names as its statements and loops."""
+    check_program(program)
     return program.source or Source(program.body)
 
 

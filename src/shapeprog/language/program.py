@@ -102,11 +102,19 @@ class Program:
 
 def programs_of(value: Any) -> list[Program]:
     """One program, or several, as a list; a ``ShapeProgError`` if anything else is among them."""
-    programs: list[Program] = list(value) if isinstance(value, Iterable) else [value]
-    if not all(isinstance(program, Program) for program in programs):
-        cure = "read text with sp.parse, and a file with sp.load; a result of sp.infer holds one as .program"
-        raise ShapeProgError(f"{reprlib.repr(value)} is no program, and no list of programs", cure)
+    programs: list[Program] = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else [value]
+    for program in programs:
+        check_program(program)
     return programs
+
+
+def check_program(value: object) -> None:
+    """Raise a ``ShapeProgError`` unless a value is a program."""
+    if not isinstance(value, Program):
+        cure = (
+            "sp.parse reads text, sp.load a file; results of sp.infer hold one as .program, sp.decode returns several"
+        )
+        raise ShapeProgError(f"{reprlib.repr(value)} is no program", cure)
 
 
 def nest(chain: Chain) -> Node:

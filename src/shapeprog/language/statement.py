@@ -235,13 +235,20 @@ def statement(
     Without ``doc`` the manual shows the first paragraph of the function's docstring; :class:`Statement` has the rest.
     A cell of a notebook that is run again, or another one that declares the same name, replaces the declaration.
     """
+    _check_name(name)
     fields = {"pivot": pivot, "quarter": quarter, "taught": taught, "hint": hint}
     return lambda draw: _declare(name, id, doc, draw, 0, draw=draw, **fields)
 
 
 def loop(name: str, *, id: int | None = None, taught: bool = True) -> Callable[[Callable[..., Motion]], Statement]:
     """Declare a loop from a function ``(copy, quarter, count, ...) -> Motion``; the first parameter is the count."""
+    _check_name(name)
     return lambda move: _declare(name, id, "", move, 2, move=move, taught=taught)
+
+
+def _check_name(name: object) -> None:
+    if not isinstance(name, str):
+        raise DeclarationError(f"{name!r} is no name", 'write the name in brackets, as in @statement("shelf")')
 
 
 def _declare(name: str, id: int | None, doc: str, function: Callable[..., Any], skip: int, **fields: Any) -> Statement:

@@ -19,7 +19,7 @@ from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.language.program import Program, programs_of
+from shapeprog.language.program import Program, check_program
 
 
 def refine(program: Program, shape: Shape | str, *, seed: int = 0) -> Program:
@@ -42,7 +42,7 @@ def refine(program: Program, shape: Shape | str, *, seed: int = 0) -> Program:
     ShapeProgError
         If an argument is of the wrong kind.
     """
-    programs_of([program])
+    check_program(program)
     return adjust(program, evidence_of(loaded(shape)), seed=seed)
 
 

@@ -48,12 +48,13 @@ class Assembly(NamedTuple):
 
 
 def assemble(
-    coverage: Coverage, *, blocks: int = 10, seed: int = 0, deadline: Deadline = NEVER, progress: Progress | None = None
-) -> Assembly:
+    coverage: Coverage, *, blocks: int = 10, seed: int = 0, deadline: Deadline = NEVER,
+    progress: Progress | None = None, candidates: list[Node] | None = None,
+) -> Assembly:  # fmt: skip
     """A program of at most ``blocks`` blocks for the surface of a mesh or a point cloud; the same for the same seed."""
     evidence, report = coverage.evidence, progress or (lambda step, share: None)
     report("finding structure", 0.1)
-    candidates = _candidates(evidence)
+    candidates = candidates or _candidates(evidence)
     if not candidates or evidence.area <= 0:
         return Assembly(Program(), 0.0, "")
     report("finding structure", 0.7)
@@ -73,7 +74,7 @@ def assemble(
     if not unlike or deadline.passed("another choice that reaches the sides of the target"):
         return result
     coverage = Coverage(evidence, replace(coverage.prices, side=SIDE))
-    again = assemble(coverage, blocks=blocks, seed=seed, deadline=deadline, progress=progress)
+    again = assemble(coverage, blocks=blocks, seed=seed, deadline=deadline, progress=progress, candidates=candidates)
     return result if remark_on_size(unroll(again.program), evidence.surface) else again
 
 

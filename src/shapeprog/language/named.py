@@ -54,8 +54,9 @@ class Named:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """The lowest and the highest value, up to three times the present one, with which the parts hang together and
-        none vanishes, while all other names are as they are; ``None`` unless it is free.  Takes a moment."""
+        """About the lowest and the highest value, up to three times the present one, with which the parts stay
+        connected and none vanishes, while all other names are as they are; ``None`` unless it is free.  Some values
+        between and slightly beyond are tried, not all.  Takes a moment."""
         return self.ranges().get(self.name)
 
 

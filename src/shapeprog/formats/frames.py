@@ -114,7 +114,7 @@ def placement(
         raise InputError("the program does not say how its input lies", "export a program that infer has written")
     if on_input is None:
         on_input = not file_format.maker
-    per_cell, name = _cell_size(file_format, program, frame, unit, file_unit)
+    per_cell, name = cell_size(file_format, program, frame, unit, file_unit)
     if frame is not None and on_input and not up:
         if not unit and file_format.unit != "text":
             return Placement(frame)
@@ -125,10 +125,11 @@ def placement(
     return Placement(Frame.of(per_cell, centre, matrix), name)
 
 
-def _cell_size(
-    file_format: Format, program: Program, frame: Frame | None, unit: str, file_unit: str
+def cell_size(
+    file_format: Format, program: Program, frame: Frame | None, unit: str = "", file_unit: str = ""
 ) -> tuple[float, str]:
-    """The size of a cell in a file, and the unit that it is in, empty if it is not known."""
+    """The size of a cell in a file, and the unit that it is in, empty if it is not known; all is as for
+    :func:`placement`."""
     if unit == CELLS:
         return 1.0, ""
     per_cell, source_unit = _real_size(program, frame, file_unit)

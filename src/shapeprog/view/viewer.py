@@ -22,8 +22,8 @@ from shapeprog.data.shape import Shape
 from shapeprog.errors import OutputError, ShapeProgError
 from shapeprog.files import write_text
 from shapeprog.formats.colours import colour
-from shapeprog.formats.format import format_of
-from shapeprog.formats.frames import frame_comment, placement
+from shapeprog.formats.files import written_format
+from shapeprog.formats.frames import cell_size, frame_comment
 from shapeprog.formats.parts import Part, crease_edges, part_normals, parts
 from shapeprog.language.dimensions import lengths
 from shapeprog.language.named import Named, names, set
@@ -102,10 +102,7 @@ def viewer(
             "lower the counts, or draw a picture",
         )
     given = None if shape is None else _input(shape)
-    target, stl = Path(path), format_of("a.stl")
-    assert stl is not None
-    printed = placement(stl, program, frame).frame
-    assert printed is not None
+    target = Path(path)
     content = {
         "frame": frame_comment(frame, program),
         "title": title or (shape.name if shape is not None else target.stem),
@@ -118,7 +115,7 @@ def viewer(
         ],
         "sliders": [_slider_content(slider) for slider in sliders(program, drawn)],
         "digits": digits_in(program.unit),
-        "scale": printed.scale,
+        "scale": cell_size(written_format(Path("a.stl")), program, frame)[0],
         "input": None if given is None else _buffers(*given),
     }
     text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")

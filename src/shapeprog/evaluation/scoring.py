@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -71,7 +72,7 @@ def evaluate(
     check_number("seed", seed, 0, MOST_SEED, whole=True)
     program, snapped = getattr(prediction, "program", prediction), getattr(prediction, "snapped", None)
     if not isinstance(program, Program):
-        raise ShapeProgError(f"{prediction!r} is no program", "give a program, or the result of sp.infer")
+        raise ShapeProgError(f"{reprlib.repr(prediction)} is no program", "give a program, or the result of sp.infer")
     result = SavedResult(program, frame, snapped)
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
     shape = in_pose_of(result, shape, points, seed)

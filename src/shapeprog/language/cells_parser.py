@@ -90,7 +90,8 @@ class _Reader:
             fitting += [] if kind == "loop" else registry.roles
             hint = did_you_mean(function.id, fitting)
             if kind == "statement":
-                hint += " A statement of your own needs --with, in Python sp.load_statements."
+                own = "A statement of your own needs --with, in Python sp.load_statements."
+                hint = f"{hint} {own}" if hint.endswith("?") else f"{hint}. {own}"
             raise self.text.error(function, f"unknown {kind} {function.id!r}", hint)
         declared = registry[function.id]
         if not isinstance(node, ast.Call):

@@ -53,6 +53,22 @@ def values(program: Program) -> list[list[float]]:
     return [list(node.values) for node in program.walk()]
 
 
+def test_a_case_in_one_closed_surface_with_its_overhanging_top_is_two_parts():
+    profile = np.array([(0, 0), (0, 600), (900, 600), (900, -60), (870, -60), (870, 0)], float)  # height and depth
+    vertices = np.concatenate([np.insert(profile, 2, side, axis=1) for side in (0, 620)])
+    cap, edge = np.array([(0, 1, 5), (1, 4, 5), (1, 2, 4), (2, 3, 4)]), np.arange(6)
+    following = np.roll(edge, -1)
+    walls = np.stack([edge, following + 6, following, edge, edge + 6, following + 6], 1).reshape(-1, 3)
+    shape = shape_from_mesh(vertices, np.concatenate([cap, cap[:, ::-1] + 6, walls]), axes=np.eye(3))
+    text = sp.format_program(sp.infer(shape, unit="mm").program)
+    assert text.splitlines()[1:] == [
+        "width, depth, height = 620, 660, 900",
+        "top_thickness = 30",
+        "top(top=0, height=top_thickness)",
+        "body(front=60, top=top_thickness)",
+    ]
+
+
 def test_boards_of_two_thicknesses_keep_them_and_the_whole_its_size():
     program = sp.infer(apart(CARCASS), unit="mm").program  # 24 cells are 240 mm
     found = {name.name: round(name.value / 0.3, 1) for name in sp.names(program)}

@@ -63,7 +63,8 @@ def assemble(
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     fitted = on_planes(_unharmed(adjusted, start, coverage), evidence)
-    program = connected(_pruned(snapped(fitted, evidence), coverage), coverage)
+    exact = _unharmed(snapped(fitted, evidence), fitted, coverage, 0.08)
+    program = connected(_pruned(exact, coverage), coverage)
     program = canonical_side(simplest(program))
     program = in_order(with_roles(separated(program, blocks)))
     table = coverage.table([*program.body, *others[:1]])
@@ -117,13 +118,13 @@ def _choice(
     return [nodes[index] for index in chosen], [nodes[index] for index in missed(table, chosen)]
 
 
-def _unharmed(adjusted: Program, start: Program, coverage: Coverage) -> Program:
-    """The adjusted program; blocks whose adjustment costs more than .005 of the target are restored.
+def _unharmed(adjusted: Program, start: Program, coverage: Coverage, harm: float = 0.005) -> Program:
+    """The adjusted program; blocks whose adjustment costs more than ``harm`` of the target are restored.
 
     A block loses a loop, or nested loops become one row, where the text becomes cheaper and that costs less than .001,
     the error of the coverage; and a row loses a copy that costs nothing, such as a shelf inside the top.
     """
-    options = [(index, node, 0.005) for index, node in enumerate(start.body)]
+    options = [(index, node, harm) for index, node in enumerate(start.body)]
     for index, (chain, solids) in enumerate(zip(adjusted.chains, solid_boxes(adjusted.draws), strict=True)):
         options += [(index, node, -0.001) for node in shorter(chain)]
         options += [(index, node, -0.00001) for node in recounted(chain, solids, -1)]

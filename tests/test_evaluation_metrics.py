@@ -1,10 +1,13 @@
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+import trimesh
 
+import shapeprog as sp
 from shapeprog.data.shape import Shape
 from shapeprog.evaluation.metrics import Metrics, evaluate_program, summarise, target_samples, world_scale
 from shapeprog.geometry.cells import voxels
@@ -103,3 +106,32 @@ def test_summaries_state_mean_standard_error_and_median():
     assert summary["blocks"].error == 0
     assert "name" not in summary
     assert summarise([]) == {}
+
+
+def test_a_program_is_measured_where_it_lies_however_it_is_handed_over(tmp_path: Path) -> None:
+    body, handle = trimesh.creation.box((40, 60, 30)), trimesh.creation.box((8, 1, 2))  # the handle moves the middle
+    handle.apply_translation((0, 5, 17))
+    path = tmp_path / "cabinet.obj"
+    trimesh.util.concatenate([body, handle]).apply_translation((100, 0, 0)).export(path)
+    result = sp.infer(path)
+    sp.save(result.program, tmp_path / "a.json")
+    sp.save(sp.load(tmp_path / "a.json"), tmp_path / "b.shape")
+    read = sp.load(tmp_path / "b.shape")
+    changed = sp.set(sp.set(read, width=20), width=next(each.value for each in sp.names(read) if each.name == "width"))
+    best = sp.evaluate(result, path, points=1000).f1_percent
+    assert best > 0.95
+    same = [result.program, read, changed, sp.in_unit(read, sp.Unit("m", 0.5)), tmp_path / "a.json"]
+    for program in [*same, str(tmp_path / "b.shape")]:
+        assert sp.evaluate(program, path, points=1000).f1_percent == pytest.approx(best, abs=0.01)
+        assert sp.evaluate(program, sp.load_shape(path), points=1000).f1_percent == pytest.approx(best, abs=0.01)
+    in_grid_of_target = replace(read, frame=None)
+    assert sp.evaluate(in_grid_of_target, path, points=1000).f1_percent < 0.8
+    sp.export(read, tmp_path / "out.obj")
+    sides = trimesh.load(tmp_path / "out.obj", force="mesh").bounds
+    assert sides == pytest.approx(np.array([[80, -30, -15], [120, 30, 15]]), abs=0.1)
+
+
+def test_the_axes_of_the_input_are_those_of_its_program(tmp_path: Path) -> None:
+    trimesh.creation.box((4, 2, 1)).export(tmp_path / "a.obj")
+    program = sp.infer(sp.load_shape(tmp_path / "a.obj", up="+z", front="-y")).program
+    assert sp.evaluate(program, tmp_path / "a.obj", points=1000).f1_percent > 0.99

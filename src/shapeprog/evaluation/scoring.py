@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import reprlib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -29,7 +30,7 @@ from shapeprog.formats.format import suffixes
 from shapeprog.formats.frames import in_grid_of
 from shapeprog.formats.json_form import SavedResult, read_result
 from shapeprog.geometry.voxelise import voxelise_mesh, voxelise_points
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, frame_of
 from shapeprog.language.unroll import unroll
 from shapeprog.space import Array, Frame
 
@@ -41,7 +42,7 @@ Prediction = SavedResult | Shape
 
 
 def evaluate(
-    prediction: Program | Result, target: Shape | str | Path, frame: Frame | None = None, *,
+    prediction: Program | Result | str | Path, target: Shape | str | Path, frame: Frame | None = None, *,
     points: int = POINTS, seed: int = 0,
 ) -> Metrics:  # fmt: skip
     """Measure how well a program rebuilds a shape, as the command ``shapeprog evaluate`` does.
@@ -49,13 +50,13 @@ def evaluate(
     Parameters
     ----------
     prediction
-        A program, or the result of :func:`shapeprog.infer`.
+        A program, the path of its file, or the result of :func:`shapeprog.infer`.
     target
         The shape that it should be, or its path.  A file is read in the axes of ``frame``.  Of a cloud ``2 * points``
         points are read from a path, as by the command; a loaded shape is measured with the points that it has.
     frame
-        Where a program from a file lies, as :func:`shapeprog.load_with_frame` gives it.  Without it the program is in
-        the grid of the target, as a result of inference is.
+        Where the program lies; by default its own frame, which programs of inference and of files have.  Without any,
+        or if its statements are in cells, it is in the grid of the target, as with ``target.frame``.
     points
         Points on each surface for CD and F1 at one cell.
     seed
@@ -64,22 +65,28 @@ def evaluate(
     Raises
     ------
     InputError
-        If the path is no readable shape, or a shape without a file has other axes than the frame.
+        If a path is no readable file, or a shape without a file has other axes than the frame.
     ShapeProgError
         If another argument is of the wrong kind or out of range.
     """
     check_number("points", points, 2, whole=True)
     check_number("seed", seed, 0, MOST_SEED, whole=True)
-    program, snapped = getattr(prediction, "program", prediction), getattr(prediction, "snapped", None)
-    if not isinstance(program, Program):
-        raise ShapeProgError(f"{reprlib.repr(prediction)} is no program", "give a program, or the result of sp.infer")
-    result = SavedResult(program, frame, snapped)
+    if isinstance(prediction, str | os.PathLike) and "\n" not in str(prediction):  # else it is the text of a program
+        result = _read(Path(prediction))
+    else:
+        program, snapped = getattr(prediction, "program", prediction), getattr(prediction, "snapped", None)
+        if not isinstance(program, Program):
+            cure = "give a program, the path of its file, or the result of sp.infer"
+            raise ShapeProgError(f"{reprlib.repr(prediction)} is no program", cure)
+        result = SavedResult(program, snapped=snapped)
+    frame = frame_of(result.program, frame)
+    result = result._replace(frame=frame)
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
     shape = in_pose_of(result, shape, points, seed)
     if frame is not None and not np.allclose(frame.axes, shape.frame.axes, atol=1e-6):
         raise InputError(
             "the program has other axes than the target",
-            "load the target with the axes of the frame: up and front of sp.load_shape",
+            "load the target with the axes of the frame: up and front of sp.load_shape; or give its frame",
         )
     return measure(result, shape, points, seed)
 
@@ -95,15 +102,18 @@ def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str,
             files = program_files(path)
     for file in files:
         try:
-            with in_words(file, "a program"):
-                result = read_result(file) if file.suffix.lower() == ".json" else SavedResult(*load_with_frame(file))
+            yield file, file.stem, _read(file)
         except ShapeProgError as error:
             yield file, file.stem, error
-        else:
-            yield file, file.stem, result
     if not files:
         for file, shape in load_all([path], points=points, seed=seed):
             yield file, (file.stem if isinstance(shape, ShapeProgError) else shape.name), shape
+
+
+def _read(file: Path) -> SavedResult:
+    """The contents of a program file."""
+    with in_words(file, "a program"):
+        return read_result(file) if file.suffix.lower() == ".json" else SavedResult(*load_with_frame(file))
 
 
 def read_targets(

@@ -10,12 +10,12 @@ from shapeprog.errors import InputError, OutputError, did_you_mean
 from shapeprog.files import write_bytes
 from shapeprog.formats.format import Format, format_of, listed, program_suffixes, suffixes
 from shapeprog.formats.frames import asked_unit, placement
-from shapeprog.language.program import Program, check_program
+from shapeprog.language.program import Program, check_program, frame_of
 from shapeprog.space import Frame
 
 
 def load(path: str | os.PathLike[str]) -> Program:
-    """The program in a file: program text or JSON, by its suffix.
+    """The program in a file, program text or JSON by its suffix, with the frame of its input if the file has one.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def load(path: str | os.PathLike[str]) -> Program:
 
 
 def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None]:
-    """The program in a file, and the frame of its input if the file has one.
+    """The program in a file, and its frame, which it has as ``program.frame``, too.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def program_files(folder: Path) -> list[Path]:
 
 
 def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = None) -> None:
-    """Write a program so that :func:`load_with_frame` returns the same program and frame.
+    """Write a program so that :func:`load` returns the same program with the same frame.
 
     A program in cells that names sizes of the whole, or its floor, is written with its parts placed from the sides.
 
@@ -79,7 +79,7 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     path
         Where to; ends in .shape or .json.
     frame
-        From the grid to the coordinates of the input, if it is to be stored.
+        From the grid to the coordinates of the input, which is stored; by default that of the program.
 
     Raises
     ------
@@ -125,9 +125,10 @@ def export(
     path
         Where to; the folder must exist.
     frame
-        From the grid to the coordinates of the input, so that the export lies on it; without it the shape stands
-        upright in the axes of the format.  Formats for makers (.stl .3mf .scad .py .step) are upright, z up, on z = 0
-        and in millimetres in any case (:mod:`shapeprog.formats.frames`).
+        From the grid to the coordinates of the input, so that the export lies on it; by default that of the program.
+        Without any the shape stands upright in the axes of the format, as with ``on_input=False``.  Formats for makers
+        (.stl .3mf .scad .py .step) are upright, z up, on z = 0 and in millimetres in any case
+        (:mod:`shapeprog.formats.frames`).
     unit, file_unit, up, on_input
         Other coordinates than those of the format, see :func:`~shapeprog.formats.frames.placement`.
     options
@@ -140,6 +141,7 @@ def export(
         If the suffix is unknown, the program draws nothing that the format can hold, or the file cannot be written.
     """
     check_program(program)
+    frame = frame_of(program, frame)
     target = Path(path)
     file_format, suffix = written_format(target), target.suffix.lower()
     if file_format.kind == "program" and unit:

@@ -29,7 +29,7 @@ from shapeprog.language.ast import Draw, Part
 from shapeprog.language.evaluate import provenance
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.printer import printed, source_of
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, frame_of
 from shapeprog.language.statement import language
 from shapeprog.language.text import Text
 from shapeprog.space import Frame
@@ -94,7 +94,7 @@ def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -
     program
         What to write.
     frame
-        From the grid to the coordinates of the input, if it is known.
+        From the grid to the coordinates of the input; by default that of the program, if it is known.
     more
         Further entries, such as ``scores``.
 
@@ -103,7 +103,8 @@ def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -
     ShapeProgError
         As for :func:`shapeprog.format_program`.
     """
-    text, unit = program_text(program, frame), program.unit
+    frame, unit = frame_of(program, frame), program.unit
+    text = program_text(program, frame)
     content = {"format": FORMAT, "version": VERSION, "text": text, "unit": "cells" if unit is None else unit.name}
     if frame is not None:
         placed = frame_of_text(frame, scale_of(program))

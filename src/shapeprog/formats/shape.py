@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from shapeprog.errors import InputError
@@ -25,7 +26,8 @@ def program_in(text: str, name: str) -> tuple[Program, Frame | None]:
     """The program of a text, and its frame if a comment stores one."""
     text, frame = split_frame(text, name)
     program = parse(text, name)
-    return program, None if frame is None else frame_of_grid(frame, scale_of(program))
+    frame = None if frame is None else frame_of_grid(frame, scale_of(program))
+    return replace(program, frame=frame), frame
 
 
 def program_text(program: Program, frame: Frame | None) -> str:

@@ -203,7 +203,7 @@ def infer(
             program = tunable.settled(tunable.values)
         if libraries:
             program = with_library(program, library)
-    program = in_readable_unit(program, unit_of_result(target, program, unit))
+    program = replace(in_readable_unit(program, unit_of_result(target, program, unit)), frame=target.frame)
     front = note_on_front(program, target.frame) if target.points is not None and statements == "all" else ""
     size = remark_on_size(unroll(program), evidence.surface) if target.points is not None else ""
     doubt = doubt_of_furniture(evidence.surface, evidence.surface_normals)

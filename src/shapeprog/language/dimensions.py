@@ -152,7 +152,7 @@ def in_unit(program: Program, unit: Unit | None, workshop: bool = False, digits:
             return to_float32(round(result, max(least, decimals)))
         return to_float32(float(f"{result:.{digits}g}"))
 
-    return _scaled(Source(_Powers(source).changed(source.lines, change), unit), source)
+    return replace(_scaled(Source(_Powers(source).changed(source.lines, change), unit), source), frame=program.frame)
 
 
 def literal_lengths(program: Program) -> tuple[list[float], Callable[[Sequence[float]], Program]]:

@@ -63,7 +63,7 @@ class Named:
 def inline(program: Program) -> Program:
     """The program written out: statements and loops in cells with plain numbers."""
     check_program(program)
-    return Program(program.body)
+    return Program(program.body, frame=program.frame)
 
 
 def names(program: Program) -> list[Named]:
@@ -115,7 +115,8 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
             message = f"{name} = {number!r} is no number, not finite, or too large for single precision"
             raise ShapeProgError(message, "write one such as 12.5")
     try:
-        return evaluated(replace(source, lines=tuple(_set(line, replacements) for line in source.lines)))
+        edited = evaluated(replace(source, lines=tuple(_set(line, replacements) for line in source.lines)))
+        return replace(edited, frame=program.frame)
     except Fault as fault:
         (text, _), *_ = printed(Source((fault.line,), scale=source.scale))
         raise ShapeProgError(f"{fault.message}, in {text}", fault.hint) from None

@@ -6,7 +6,7 @@ import importlib
 import math
 import reprlib
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -15,6 +15,7 @@ from shapeprog.language.ast import Draw as Draw
 from shapeprog.language.ast import Loop as Loop
 from shapeprog.language.ast import Scale, Source, changed_lines, changed_values
 from shapeprog.language.unit import Unit
+from shapeprog.space import Frame
 
 PUBLISHED_DEPTH = 3  # steps of one block in the published generator
 DEEPEST = 64  # levels of loops, calls and parentheses in text; Python itself ends at 100 levels of indentation
@@ -31,11 +32,13 @@ class Program:
 
     If its parts are placed, ``source`` is its text and ``body`` the value of that: see
     :func:`shapeprog.language.evaluate.evaluated`, which makes such programs.  Functions of shapes use the body alone; a
-    program of statements in cells has no source.
+    program of statements in cells has no source.  ``frame`` leads from its grid to the coordinates of its input, where
+    that is known: in results of :func:`shapeprog.infer`, and in files with a frame.
     """
 
     body: tuple[Node, ...] = ()
     source: Source | None = None
+    frame: Frame | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
         """Its text, without the last line break."""
@@ -115,6 +118,13 @@ def check_program(value: object) -> None:
             "sp.parse reads text, sp.load a file; results of sp.infer hold one as .program, sp.decode returns several"
         )
         raise ShapeProgError(f"{reprlib.repr(value)} is no program", cure)
+
+
+def frame_of(program: Program, frame: object) -> Frame | None:
+    """The frame that a caller gives, or else that of the program; a ``ShapeProgError`` if it is none."""
+    if not isinstance(frame, Frame | None):
+        raise ShapeProgError(f"frame is {reprlib.repr(frame)}", "give the frame of a shape or of a program, or nothing")
+    return frame or program.frame
 
 
 def nest(chain: Chain) -> Node:

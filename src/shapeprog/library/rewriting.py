@@ -67,7 +67,7 @@ def with_library(program: Program, library: Library) -> Program:
     if statements(best[1]) >= statements(original):
         return program
     before, result = source_of(original), source_of(in_unit(best[1], original.unit))
-    return evaluated(replace(result, unit=before.unit, scale=before.scale))
+    return replace(evaluated(replace(result, unit=before.unit, scale=before.scale)), frame=program.frame)
 
 
 def _length(program: Program) -> int:

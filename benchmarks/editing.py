@@ -118,7 +118,8 @@ def _names_kept(program: Program, before: Scene) -> float:
     kept = []
     for named in [named for named in names(program) if named.free]:
         try:
-            scenes = [unroll(set(program, {named.name: factor * named.value})) for factor in OF_NAMES]
+            values = [factor * named.value for factor in OF_NAMES]
+            scenes = [unroll(set(program, {named.name: round(value) if named.whole else value})) for value in values]
         except ShapeProgError:  # such as a negative size
             kept.append(False)
             continue

@@ -160,6 +160,17 @@ def test_numbers_that_fit_no_more_are_told_when_they_are_set() -> None:
         sp.set(program, n=0)
 
 
+@pytest.mark.parametrize(
+    "loop", ["translate(n, x=2)", "row(n, last=at(right=0))", "divide(n, x)", "rotate(n + 1)", "translate(2 * n, z=1)"]
+)
+def test_numbers_of_copies_are_whole_and_not_negative(loop: str) -> None:
+    program = parse(f"width, depth, height = 6, 6, 6\nn, w = 2, 1\nfor _ in {loop}:\n    leg(left=0, width=w)")
+    for wrong in (2.5, -1, torch.tensor(0.5)):
+        with pytest.raises(sp.ShapeProgError, match=r"n = .* is no number of copies\n  hint: .*whole number of 0"):
+            sp.set(program, n=wrong)
+    assert sp.set(program, n=3.0, w=1.5) == sp.set(program, n=3, w=torch.tensor(1.5))
+
+
 BENT = "width, depth, height = 9, 9, 9\na, b = 2, 4\nbox(x=a * b, width=4, y=a / b, depth=b - 1, z=a, height=a)"
 
 

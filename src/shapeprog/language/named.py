@@ -90,7 +90,7 @@ def names(program: Program) -> list[Named]:
 def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbers: float) -> Program:
     """The program with other numbers for some of its names, in the unit of its text: ``set(program, seat=11)``.
 
-    A number replaces an expression too.  The cells that a unit has stay the same.
+    A number replaces an expression too; a number of copies is whole.  The cells that a unit has stay the same.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
     if not replacements:
         return program
     source = program.source or Source()
-    declared = source.numbers
+    declared, counted = source.numbers, counted_names(source)
     for name in replacements:
         if name not in declared:
             more = f" and {len(declared) - LISTED} more in its text" if len(declared) > LISTED else ""
@@ -110,10 +110,12 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
             hint = f"{did_you_mean(name, declared, ' ')} {known}".strip()
             hint = hint if declared else "it has no names: write name = number at its top"
             raise ShapeProgError(f"this program has no name {name!r}", hint)
-        number = replacements[name]
-        if not abs(number_of(number)) <= LARGEST:  # true of NaN, too
-            message = f"{name} = {number!r} is no number, not finite, or too large for single precision"
+        value, number = replacements[name], number_of(replacements[name])
+        if not abs(number) <= LARGEST:  # true of NaN, too
+            message = f"{name} = {value!r} is no number, not finite, or too large for single precision"
             raise ShapeProgError(message, "write one such as 12.5")
+        if name in counted and (number < 0 or number % 1):
+            raise ShapeProgError(f"{name} = {number:g} is no number of copies", "give a whole number of 0 or more")
     try:
         edited = evaluated(replace(source, lines=tuple(_set(line, replacements) for line in source.lines)))
         return replace(edited, frame=program.frame)

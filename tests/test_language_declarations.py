@@ -142,6 +142,11 @@ def unused(at: Position, size: Extent, edge: Length) -> Solids:
     return box(at, size)
 
 
+def endless(at: Position, size: Extent) -> Solids:
+    """The root of a negative number."""
+    return box(at, (-size).sqrt())
+
+
 def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solids:
     """A range from 4 to 2."""
     return box(at, at)
@@ -168,6 +173,7 @@ def backwards(at: Annotated[torch.Tensor, Quantity("length", 3, 4, 2)]) -> Solid
         ("crate", {}, detached, "returns solids without a gradient to size\n.* compute with torch alone"),
         ("crate", {}, through_numpy, "cannot be drawn: Can't call numpy.*\n.* compute with torch alone"),
         ("crate", {}, unused, "without a gradient to edge\n  hint: use every parameter"),
+        ("crate", {}, endless, "returns solids with numbers that are not finite\n  hint: it is tried with 0, 0, 0, "),
         ("crate", {}, backwards, "ends before it starts"),
         ("crate", {}, part_of_a_copy, "wrong default of 'n': n of crate is 2.5, but must be whole"),
         ("crate", {}, no_axis, "wrong default of .* not an axis"),

@@ -21,7 +21,8 @@ _TORCH_ALONE = "use every parameter, and compute with torch alone: NumPy, float(
 def check_declaration(declared: Statement) -> None:
     """Draw or move once with mid-range parameters.
 
-    A ``DeclarationError`` if that fails, returns something of another kind or shape, or if a number has no gradient.
+    A ``DeclarationError`` if that fails, returns something of another kind or shape, a number that is not finite, or if
+    a number has no gradient.
     """
     middle = [(quantity.low + quantity.high) / 2 for quantity in declared.quantities]
     values = torch.tensor(middle).repeat(2, 1).requires_grad_()
@@ -56,6 +57,9 @@ def check_declaration(declared: Statement) -> None:
     if not parts or any(shape not in (None, right) for shape, (_, right) in zip(shapes, parts, strict=True)):
         requirement += " with the leading dimensions of the parameters"
         raise DeclarationError(f"{what} of shapes {shapes}", requirement)
+    if not all(bool(part.isfinite().all()) for part, _ in parts if part is not None):
+        cure = f"it is tried with {', '.join(f'{number:g}' for number in middle)}: compute finite numbers from them"
+        raise DeclarationError(f"{what} with numbers that are not finite", cure)
     continuous = [parameter.name for parameter in declared.parameters if not parameter.quantity.discrete]
     recorded = [part.sum() for part, _ in parts if part is not None and part.requires_grad]
     reached = [named[word] for word in continuous]

@@ -377,19 +377,19 @@ def test_a_wrong_frame_of_a_placed_text_has_its_place(entries: str, column: int,
 
 
 @pytest.mark.parametrize(
-    "frame",
+    "wrong",
     [
-        *(Frame(scale) for scale in (0.0, -1.0, float("nan"), float("inf"))),
-        Frame(centre=(float("inf"), 0, 0)),
-        Frame(axes=((2, 0, 0), (0, 1, 0), (0, 0, 1))),
-        Frame(axes=((-1, 0, 0), (0, 1, 0), (0, 0, 1))),
+        *({"scale": scale} for scale in (0.0, -1.0, float("nan"), float("inf"))),
+        {"centre": (float("inf"), 0, 0)},
+        {"axes": ((2, 0, 0), (0, 1, 0), (0, 0, 1))},
+        {"centre": (1, 2)},
+        {"axes": ((-1, 0, 0), (0, 1, 0), (0, 0, 1))},
+        {"axes": ((1, 0), (0, 1))},
     ],
 )
-def test_a_frame_that_would_not_be_read_back_is_not_saved(frame: Frame, tmp_path: Path):
-    for name in ("a.shape", "a.json"):
-        with pytest.raises(OutputError, match="cannot be stored"):
-            sp.save(parse(PLACED), tmp_path / name, frame)
-    assert list(tmp_path.iterdir()) == []
+def test_a_frame_that_would_not_be_read_back_is_none(wrong: dict[str, Any]):
+    with pytest.raises(sp.ShapeProgError, match=r"scale is|is no frame"):
+        Frame(**wrong)
 
 
 def test_json_lists_the_solids_with_their_lines_and_bounds():

@@ -20,6 +20,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shapeprog.arguments import check_number
+from shapeprog.errors import ShapeProgError
+
 RESOLUTION = 32  # cells along each side of the grid
 HALF = RESOLUTION // 2  # distance in cells from the centre of the grid to its sides
 SPAN = 24  # cells along the longest side of a shape that is in the grid frame
@@ -64,17 +67,28 @@ def axis_name(direction: FloatArray) -> str:
     return ("-" if direction[axis] < 0 else "+") + "xyz"[axis]
 
 
+def is_rotation(axes: FloatArray) -> bool:
+    """Whether the columns of a matrix (3, 3) are perpendicular unit directions, right-handed."""
+    return axes.shape == (3, 3) and bool(np.allclose(axes.T @ axes, np.eye(3), atol=1e-6) and np.linalg.det(axes) > 0)
+
+
 @dataclass(frozen=True)
 class Frame:
     """The similarity that leads from the grid to the world: ``world = centre + axes @ (scale * grid)``.
 
     ``scale`` is in world units per cell; ``centre`` is the world position of the grid's origin; the columns of the
-    rotation ``axes`` (3, 3) are the world directions of up, depth and left-right.
+    rotation ``axes`` (3, 3) are the world directions of up, depth and left-right.  Others are a ``ShapeProgError``.
     """
 
     scale: float = 1.0
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    def __post_init__(self) -> None:
+        check_number("scale", self.scale, 0, above=True)
+        centre, axes = np.asarray(self.centre), np.asarray(self.axes)
+        if centre.shape != (3,) or not np.isfinite(centre).all() or not is_rotation(axes):
+            raise ShapeProgError(f"{self} is no frame", "its centre must be finite and its axes a rotation")
 
     @staticmethod
     def around(low: npt.ArrayLike, high: npt.ArrayLike, axes: npt.ArrayLike | None = None) -> Frame:

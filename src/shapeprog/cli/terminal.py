@@ -226,7 +226,7 @@ def check_axes(up: str | None, front: str | None) -> None:
     on one line."""
     from shapeprog.data.orientation import axes_of
 
-    axes_of(Path("--up and --front"), up, front)
+    axes_of(Path(), up, front)
 
 
 def check_units(unit: str | None, file_unit: str | None, needed: bool = False) -> None:

@@ -210,7 +210,7 @@ Place = Callable[..., Shape]
 def placed(path: Path, up: str | None, front: str | None, make: Callable[..., Shape], cloud: bool = False) -> Shape:
     """The shape that a function of ``axes`` makes, in the requested axes, or those of the path; with a note if up is
     estimated."""
-    if up != AUTO:
+    if str(up) != AUTO:
         return make(axes=axes_of(path, up, front, cloud))
     default_shape = make(axes=axes_of(path, None, front, cloud))
     estimate = find_up(

@@ -56,7 +56,7 @@ def axes_of(path: Path, up: str | None, front: str | None, cloud: bool = False) 
         If a name is not an axis or the two lie on one line.
     """
     usual_up, usual_front = default_axes(path, cloud)
-    up = None if up == AUTO else up
+    up, front = (None if axis is None or str(axis) == AUTO else str(axis) for axis in (up, front))
     rise, face = up or usual_up, front or usual_front
     if up and not front and up.strip()[-1:].lower() == usual_front[-1]:
         face = _opposite(usual_up) if _same(up, usual_front) else usual_up
@@ -65,9 +65,8 @@ def axes_of(path: Path, up: str | None, front: str | None, cloud: bool = False) 
     try:
         return grid_axes(rise, face)
     except ValueError as error:
-        raise InputError(
-            f"{path.name}: {error}", "give --up and --front as two different axes, as in +y and -z"
-        ) from None
+        cure = "up and front, on the command line --up and --front, are two different axes, such as +y and -z"
+        raise InputError(str(error), cure) from None
 
 
 def _opposite(axis: str) -> str:

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeprog.errors import InputError, OutputError
+from shapeprog.errors import InputError
 from shapeprog.formats.format import CELLS, GRID, Y_UP, Z_UP, Format
 from shapeprog.language.ast import Scale
 from shapeprog.language.evaluate import evaluated
@@ -32,7 +32,7 @@ from shapeprog.language.printer import source_of
 from shapeprog.language.program import Program
 from shapeprog.language.text import Text
 from shapeprog.language.unit import METRES, Unit, assumed_unit, metres
-from shapeprog.space import SPAN, FloatArray, Frame, axis_direction, axis_name, grid_axes
+from shapeprog.space import SPAN, FloatArray, Frame, axis_direction, axis_name, grid_axes, is_rotation
 
 _LINE_END = r"(?:\r?\n|\r(?!\n))"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -228,13 +228,9 @@ def scale_of(program: Program) -> Scale:
 
 
 def frame_comment(frame: Frame | None, program: Program) -> str:
-    """The comment line above the text of a program that stores the map from the grid to the world; empty without it.
-    An ``OutputError`` if :func:`split_frame` would not read it."""
+    """The comment line above the text of a program that stores the map from the grid to the world; empty without it."""
     if frame is None:
         return ""
-    if not (np.isfinite([frame.scale, *frame.centre]).all() and frame.scale > 0 and _is_rotation(np.array(frame.axes))):
-        cure = "its scale must be above 0, its centre finite and its axes a rotation"
-        raise OutputError(f"{frame} cannot be stored with a program", cure)
     scale = scale_of(program)
     text, unit_name = frame_of_text(frame, scale), "" if program.unit is None else program.unit.name
     size = f"{text.scale:.8g}"
@@ -272,17 +268,13 @@ def split_frame(text: str, name: str) -> tuple[str, Frame | None]:
         *origin, size = (float(number) for number in entries.groups()[2:])
         up, rear = _direction(entries[1]), -_direction(entries[2])
         rotation = np.stack([up, rear, np.cross(up, rear)], 1)
-        if not _is_rotation(rotation):
+        if not is_rotation(rotation):
             wrong = "up and front are not perpendicular unit directions"
         elif np.isfinite([*origin, size]).all() and size > 0:
             return text[: comment.end(1)] + text[comment.end() :], Frame.of(size, np.array(origin), rotation @ _GRID)
     row, column = len(re.findall(_LINE_END, comment[1])) + 1, comment.start(2) - comment.end(1) + 1
     cure = "write it as # placed: up y, front z, origin 0 0.5 0, 1 unit = 1, or remove it"
     raise Text(text, name).at(row, column, wrong, cure)
-
-
-def _is_rotation(axes: FloatArray) -> bool:
-    return bool(np.allclose(axes.T @ axes, np.eye(3), atol=1e-6) and np.linalg.det(axes) > 0)
 
 
 def _direction(text: str) -> FloatArray:

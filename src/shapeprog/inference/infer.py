@@ -159,6 +159,8 @@ def infer(
     check_number("budget", budget, 0, endless=True)
     if not isinstance(settings, Settings | None):
         raise ShapeProgError(f"settings is {settings!r}", "give shapeprog.inference.Settings(), or nothing")
+    if not (progress is None or callable(progress)):
+        raise ShapeProgError(f"progress is {progress!r}", "give a function of a step and a share, or nothing")
     library = joined(libraries)
     if statements not in ("all", "paper"):
         raise ShapeProgError(f"unknown statements {statements!r}", "choose all or paper")

@@ -483,7 +483,7 @@ def test_evaluate_in_python_gives_the_figures_of_the_command(run: Run, tmp_path:
     for name in ("table.obj", "cloud.xyz"):
         row = json.loads(run("evaluate", "table.json", name, "--json", "--points", 1000, "--seed", 3).out)["rows"][0]
         known = sp.evaluate(known_program, name, frame, points=1000, seed=3)
-        loaded = sp.evaluate(known_program, load_shape(name, points=2000, seed=3), frame, points=1000, seed=3)
+        loaded = sp.evaluate(known_program, load_shape(name), frame, points=1000, seed=3)
         assert {name: value for name, value in asdict(known).items() if value == value} == row
         assert repr(loaded) == repr(known)
     with pytest.raises(sp.InputError, match="other axes than the target"):

@@ -90,14 +90,14 @@ def shape_from_points(
             "export the model again with its faces, or with more points",
         )
     placed = frame.to_grid(cloud)
-    sample, scan = _some(placed, points, seed), _some(placed, SCAN, seed)
+    sample, scan = some(placed, points, seed), some(placed, SCAN, seed)
     return Shape(
         name, voxelise_points(placed), sample, frame, source=source, kind="points", note=_flatness(placed, name),
         scan=scan if len(scan) > len(sample) else None,
     )  # fmt: skip
 
 
-def _some(cloud: Array, count: int, seed: int) -> npt.NDArray[np.float32]:
+def some(cloud: Array, count: int, seed: int) -> npt.NDArray[np.float32]:
     """So many of the points of a cloud, in their order."""
     if len(cloud) > count:
         cloud = cloud[np.sort(np.random.default_rng(seed).choice(len(cloud), count, replace=False))]

@@ -18,6 +18,7 @@ from shapeprog.arguments import MOST_SEED, check_number
 from shapeprog.data import load_all
 from shapeprog.data.loading import load_in_axes, path_of
 from shapeprog.data.parts import read_parts
+from shapeprog.data.placement import some
 from shapeprog.data.reading import in_words
 from shapeprog.data.sampling import sample_surface
 from shapeprog.data.shape import Shape
@@ -53,7 +54,7 @@ def evaluate(
         A program, the path of its file, or the result of :func:`shapeprog.infer`.
     target
         The shape that it should be, or its path.  A file is read in the axes of ``frame``.  Of a cloud ``2 * points``
-        points are read from a path, as by the command; a loaded shape is measured with the points that it has.
+        points are measured: of a file as by the command, of a loaded shape from the up to 20,000 that it keeps.
     frame
         Where the program lies; by default its own frame, which programs of inference and of files have.  Without any,
         or if its statements are in cells, it is in the grid of the target, as with ``target.frame``.
@@ -83,6 +84,8 @@ def evaluate(
     result = result._replace(frame=frame)
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
     shape = in_pose_of(result, shape, points, seed)
+    if shape is target and shape.scan is not None:
+        shape = replace(shape, points=some(shape.scan, 2 * points, seed))
     if frame is not None and not np.allclose(frame.axes, shape.frame.axes, atol=1e-6):
         raise InputError(
             "the program has other axes than the target",

@@ -32,7 +32,7 @@ def chamfer(
     Parameters
     ----------
     points, target
-        Clouds (..., P, 3) and (..., Q, 3) in cells, with gradient to both.
+        Clouds (..., P, 3) and (..., Q, 3) in cells with equal leading dimensions, with gradient to both.
     weights, target_weights
         How much each point counts in the mean of its cloud; evenly by default.  Those of :func:`shapeprog.sample` add
         to the gradient how the areas of faces change.
@@ -64,7 +64,7 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
     scene
         What programs unroll to, with gradient to sizes and poses.
     target
-        Points (..., P, 3) in cells.
+        Points (P, 3) in cells, the same for all scenes, or (..., P, 3) with their leading dimensions.
     surface
         Whether the distance to the surface counts, so that points deep inside cost too.
 
@@ -78,8 +78,8 @@ def coverage(scene: Batch, target: Cloud, *, surface: bool = False) -> Values:
     ShapeProgError
         If ``scene`` is no scene, or the target has another type or shape, or numbers that are not finite.
     """
-    distance = signed_distance(scene, target)
     check_points("target", target)
+    distance = signed_distance(scene, target)
     return (distance.abs() if surface else distance.clamp(min=0)).mean(-1)
 
 

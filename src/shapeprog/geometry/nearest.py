@@ -45,13 +45,14 @@ def squared_distance(queries: Cloud, points: Other) -> Float[Tensor, "*batch P"]
 
 def _pair(queries: Cloud, points: Other) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B Q 3"]]:
     """Both clouds with one batch dimension and of one type."""
-    for cloud in (queries, points):
-        check_tensor("cloud", cloud, "P", 3, empty=True)
+    check_tensor("points", queries, "P", 3, empty=True)
+    check_tensor("target", points, "P", 3, empty=True)
     if not points.shape[-2]:
         raise ShapeProgError("there are no points to be near to", "give at least one point for each shape")
     if queries.shape[:-2] != points.shape[:-2]:
-        message = f"clouds of shapes {tuple(queries.shape)} and {tuple(points.shape)} do not pair up"
-        raise ShapeProgError(message, "both must be (..., points, 3) with the same leading dimensions")
+        message = f"points of the shape {tuple(queries.shape)} and a target of {tuple(points.shape)} do not pair up"
+        cure = "give (..., P, 3) and (..., Q, 3) with equal leading dimensions; cloud.expand(B, -1, -1) repeats (P, 3)"
+        raise ShapeProgError(message, cure)
     count = queries.shape[:-2].numel()
     source = queries.reshape(count, queries.shape[-2], 3).contiguous()
     return source, points.to(source).reshape(count, points.shape[-2], 3).contiguous()

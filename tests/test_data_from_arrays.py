@@ -48,6 +48,22 @@ def test_a_shape_is_shown_in_one_line() -> None:
     assert repr(sp.shape_from_voxels(CELLS)) == "<Shape 'voxels': voxels, 1,536 cells, longest side 6>"
 
 
+@pytest.mark.parametrize("side", [8, 32])
+def test_an_export_of_voxels_has_their_size_and_place(tmp_path: Path, side: int) -> None:
+    cells, size = np.zeros((side,) * 3, np.bool_), np.array([6, 2, 2]) * (side // 8)
+    cells[tuple(slice(step, step + length) for step, length in zip((1, 2, 3), size, strict=True))] = True
+    origin = np.array([100, -50, 7])
+    shape = sp.shape_from_voxels(cells, pitch=20, origin=origin, unit="mm", up="+x", front="-z")
+    program = sp.infer(shape).program
+    assert program.unit is not None
+    assert program.unit.name == "mm"
+    sp.export(program, tmp_path / "a.ply")
+    low = origin + 20 * np.array([1, 2, 3])
+    assert trimesh.load(tmp_path / "a.ply").bounds == pytest.approx(np.array([low, low + 20 * size]), abs=20)
+    sizes = trimesh.load(sp.export(program, tmp_path / "a.stl")).extents
+    assert sorted(sizes) == pytest.approx(sorted(20 * size), abs=20)  # a cell
+
+
 def test_a_shape_of_voxels_keeps_them_when_the_array_changes() -> None:
     cells = np.zeros((32, 32, 32), np.bool_)
     cells[4:28, 10:22, 10:22] = True
@@ -75,6 +91,11 @@ def test_a_shape_of_voxels_keeps_them_when_the_array_changes() -> None:
         (lambda: sp.shape_from_voxels(CELLS * 0.5), "holds voxels with the value 0.5"),
         (lambda: sp.shape_from_voxels(CELLS[:7]), r"voxels holds an array of shape \(7, 8, 8\)"),
         (lambda: sp.shape_from_voxels(CELLS[None]), r"\(1, 8, 8, 8\)\n  hint: give the shape \(R, R, R\)"),
+        (lambda: sp.shape_from_voxels(CELLS, pitch=0), "pitch is 0\n  hint: give a number above 0"),
+        (lambda: sp.shape_from_voxels(CELLS, pitch=(1, 1, 1)), r"pitch is \(1, 1, 1\)"),
+        (lambda: sp.shape_from_voxels(CELLS, origin=3), "origin is 3\n  hint: give three finite numbers"),
+        (lambda: sp.shape_from_voxels(CELLS, origin="abc"), "origin is 'abc'"),
+        (lambda: sp.shape_from_voxels(CELLS, origin=(0, 0, np.nan)), "origin is"),
         (lambda: sp.shape_from_voxels(CELLS * 0), "occupied"),
     ],
 )

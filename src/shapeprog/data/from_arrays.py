@@ -74,9 +74,13 @@ def shape_from_points(
 
 
 def shape_from_voxels(
-    voxels: npt.ArrayLike, *, up: str | None = None, front: str | None = None, name: str = "voxels", unit: str = ""
-) -> Shape:
-    """The shape of a voxel grid (R, R, R) of booleans, or of 0 and 1, whose cells have the side 1 of a unit.
+    voxels: npt.ArrayLike, *, up: str | None = None, front: str | None = None, name: str = "voxels", unit: str = "",
+    pitch: float = 1.0, origin: npt.ArrayLike = (0.0, 0.0, 0.0),
+) -> Shape:  # fmt: skip
+    """The shape of a voxel grid (R, R, R) of booleans, or of 0 and 1.
+
+    Cells have the side ``pitch``, in ``unit`` where that is named, and the lowest corner of the first is at ``origin``:
+    so exports have the right size, and programs in a unit.
 
     Other grids than 32 x 32 x 32 are resampled to that, where a part may be up to a cell of it thinner or thicker; a
     mesh, as marching cubes make one, keeps fine grids exact.
@@ -85,7 +89,12 @@ def shape_from_voxels(
     :func:`shapeprog.shape_from_mesh`.
     """
     cells = occupied(_numbers("voxels", voxels, 3), "voxels").copy()  # the shape keeps them
-    return _made(partial(placement.shape_from_voxels, cells), name, up, front, 1, 0, unit, cloud=False)
+    check_number("pitch", pitch, 0, above=True)
+    corner = _array("origin", origin)
+    if corner.shape != (3,) or corner.dtype.kind not in "iuf" or not np.isfinite(corner).all():
+        raise InputError(f"origin is {origin!r}", "give three finite numbers")
+    make = partial(placement.shape_from_voxels, cells, corner=corner, cell=float(pitch))
+    return _made(make, name, up, front, 1, 0, unit, cloud=False)
 
 
 def _made(

@@ -46,10 +46,10 @@ def test_programs_survive_every_form(program: Program) -> None:
 
 def survives(program: Program) -> None:
     """Exactly, the sign of zero included: hence the comparison of representations."""
-    assert repr(parse(format_program(program))) == repr(program)
-    assert repr(program_from_json(program_to_json(program))) == repr(program)
+    assert repr(parse(format_program(program)).body) == repr(program.body)
+    assert repr(program_from_json(program_to_json(program)).body) == repr(program.body)
     flat = program.flat()
-    assert repr(decode(encode(program))) == repr([flat])
+    assert repr([decoded.body for decoded in decode(encode(program))]) == repr([flat.body])
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))

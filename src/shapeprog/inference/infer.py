@@ -53,7 +53,7 @@ CELL_KERNELS = "geometry/cell", "inference/cells/"
 """Where the kernels of the search on the surface and of that on cells are; those with the same helpers together."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
     """The result of inference.
 
@@ -82,6 +82,10 @@ class Result:
     reason: str
     cut: tuple[str, ...]
     seconds: float = field(compare=False)
+
+    def __repr__(self) -> str:
+        """The first line of its report."""
+        return f"<Result: {str(self).splitlines()[0]}>"
 
     def __str__(self) -> str:
         """A short report: the size of the program, how well it fits, and why the search stopped."""

@@ -26,7 +26,7 @@ Chain = tuple[Node, ...]
 """Loops from the outermost inwards, without bodies, and the drawing statement they repeat: one block."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Program:
     """A shape as a list of drawing statements and loops, in the order they are written.
 
@@ -38,7 +38,11 @@ class Program:
 
     body: tuple[Node, ...] = ()
     source: Source | None = None
-    frame: Frame | None = field(default=None, compare=False, repr=False)
+    frame: Frame | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        """Its size in one line."""
+        return f"<Program: {self.blocks} blocks, {self.statements} statements, {self.size} solids>"
 
     def __str__(self) -> str:
         """Its text, without the last line break."""

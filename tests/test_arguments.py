@@ -101,6 +101,7 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
         (lambda: sp.infer(BENCH, budget=float("nan")), "budget is nan"),
         (lambda: sp.infer(BENCH, progress=3), "progress is 3\n  hint: give a function"),
         (lambda: sp.load_shape(BENCH, up=1), "'1' is not an axis; use x, y or z .*\n  hint: up and front, "),
+        (lambda: sp.load_shape(BENCH, front="auto"), "'auto' is not an axis"),
         (lambda: sp.load_shape(BENCH, front=np.array([0, 0, 1])), "is not an axis; use x, y or z"),
         (lambda: sp.Frame.of(0, np.zeros(3), np.eye(3)), "scale is 0.*\n  hint: give a number above 0"),
         (lambda: sp.Frame("2"), "scale is '2'"),

@@ -56,7 +56,8 @@ def axes_of(path: Path, up: str | None, front: str | None, cloud: bool = False) 
         If a name is not an axis or the two lie on one line.
     """
     usual_up, usual_front = default_axes(path, cloud)
-    up, front = (None if axis is None or str(axis) == AUTO else str(axis) for axis in (up, front))
+    up = None if up is None or str(up) == AUTO else str(up)
+    front = None if front is None else str(front)
     rise, face = up or usual_up, front or usual_front
     if up and not front and up.strip()[-1:].lower() == usual_front[-1]:
         face = _opposite(usual_up) if _same(up, usual_front) else usual_up

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -72,16 +72,14 @@ def evaluate(
     """
     check_number("points", points, 2, whole=True)
     check_number("seed", seed, 0, MOST_SEED, whole=True)
-    if isinstance(prediction, str | os.PathLike) and "\n" not in str(prediction):  # else it is the text of a program
-        result = _read(Path(prediction))
-    else:
-        program, snapped = getattr(prediction, "program", prediction), getattr(prediction, "snapped", None)
-        if not isinstance(program, Program):
-            cure = "give a program, the path of its file, or the result of sp.infer"
-            raise ShapeProgError(f"{reprlib.repr(prediction)} is no program", cure)
-        result = SavedResult(program, snapped=snapped)
-    frame = frame_of(result.program, frame)
-    result = result._replace(frame=frame)
+    is_path = isinstance(prediction, str | os.PathLike) and "\n" not in str(prediction)  # else it is a text
+    given: Any = _read(Path(prediction)) if is_path else prediction  # type: ignore[arg-type]
+    program, snapped = getattr(given, "program", given), getattr(given, "snapped", None)
+    if not isinstance(program, Program):
+        cure = "give a program, the path of its file, or the result of sp.infer"
+        raise ShapeProgError(f"{reprlib.repr(prediction)} is no program", cure)
+    frame = frame_of(program, frame)
+    result = SavedResult(program, frame, snapped)
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
     shape = in_pose_of(result, shape, points, seed)
     if shape is target and shape.scan is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -96,6 +97,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def infer(shape, *, progress, **_):
         progress("searching", 0.5)
-        return inference.Result(PROGRAM, PROGRAM.snap(), {"odd": float("nan")}, "Stopped at once.", (), seconds=0.1)
+        program, scores = replace(PROGRAM, frame=shape.frame), {"odd": float("nan")}
+        return inference.Result(program, PROGRAM.snap(), scores, "Stopped at once.", (), seconds=0.1)
 
     monkeypatch.setattr(inference, "infer", infer)

@@ -14,6 +14,7 @@ import torch
 import shapeprog as sp
 from shapeprog.arguments import check_number
 from shapeprog.geometry import losses
+from shapeprog.inference import Result
 from shapeprog.language.parser import parse
 
 pytestmark = pytest.mark.wrong_types
@@ -85,7 +86,7 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
         (lambda: sp.unroll(CODE.having(CODE.parameters.half())), "parameters hold torch.float16"),
         (lambda: sp.unroll(CODE.having(CODE.parameters.bfloat16())), r"parameters hold torch.bfloat16\n.* float32"),
         (lambda: replace(CODE, parameters=CODE.parameters[:, :1]), r"parameters have the shape .*, ids \(1, 2, 3\)"),
-        (lambda: sp.evaluate(TEXT, BENCH), "is no program\n  hint: give a program, the path of its file, or"),
+        (lambda: sp.evaluate(TEXT, BENCH), "is no program\n  hint: sp.parse reads text, sp.load a file"),
         (lambda: sp.evaluate(BENCH, BENCH), "bench_kenney.obj holds no program: its name ends in '.obj'"),
         (lambda: sp.evaluate("no.json", BENCH), "there is no file"),
         (lambda: sp.evaluate("a" * 999, BENCH), "holds no program|cannot be read"),
@@ -132,6 +133,22 @@ BENCH = Path(__file__).parents[1] / "examples" / "bench_kenney.obj"
 def test_a_wrong_argument_is_named_with_its_remedy(call: Callable[[], Any], message: str) -> None:
     with pytest.raises(sp.ShapeProgError, match=message):
         call()
+
+
+def test_a_result_stands_for_its_program(tmp_path: Path) -> None:
+    given = replace(PROGRAM, frame=sp.Frame(2.0))
+    result: Any = Result(given, None, {}, "", (), 0.0)
+    functions: list[Callable[[Any], Any]] = [
+        sp.format_program, sp.inline, sp.program_to_json,
+        lambda given: sp.export(given, tmp_path / "a.obj").read_text(),
+        lambda given: sp.in_unit(given, sp.Unit("mm", 30)), lambda given: sp.set(given, seat_bottom=40),
+        lambda given: sp.with_library(given, sp.load_library()), lambda given: [name.value for name in sp.names(given)],
+        lambda given: sp.unroll([given]).centre.tolist(), lambda given: sp.Parametric(given).values.tolist(),
+    ]  # fmt: skip
+    for function in functions:
+        assert function(result) == function(given)
+    sp.save(result, tmp_path / "a.json")
+    assert (tmp_path / "a.json").read_text() == sp.program_to_json(given)
 
 
 def test_right_arguments_pass() -> None:

@@ -19,7 +19,7 @@ from shapeprog import inference, view
 from shapeprog.cli import main, terminal, writing
 from shapeprog.data import Shape, loading
 from shapeprog.data import load as load_shape
-from shapeprog.formats import export, load_with_frame
+from shapeprog.formats import export
 from shapeprog.formats.json_form import program_to_json
 from shapeprog.space import Frame, grid_axes
 
@@ -191,7 +191,7 @@ def test_export_sets_the_numbers_that_have_names(run: Run, tmp_path: Path, chang
     (tmp_path / "legs.shape").write_text(NAMED)
     ended = run("export", "legs.shape", "other.shape", *changes, "-q")
     assert (ended.code, ended.out) == (0, ""), ended.err
-    assert load_with_frame(tmp_path / "other.shape")[0].body[0].values == (n, 0, 0, -span * (24 / max(24, span + 2)))
+    assert sp.load(tmp_path / "other.shape").body[0].values == (n, 0, 0, -span * (24 / max(24, span + 2)))
     assert "span = width - 2" in (tmp_path / "other.shape").read_text()
     assert run("export", "legs.shape", *changes, "--quiet", "again.shape").code == 0
 
@@ -479,15 +479,15 @@ def test_evaluate_in_python_gives_the_figures_of_the_command(run: Run, tmp_path:
     cloud = FRAME.to_world(sp.sample(sp.unroll(PROGRAM), 12_000).points)
     np.savetxt(tmp_path / "cloud.xyz", cloud)
     table(tmp_path / "table.obj")
-    known_program, frame = load_with_frame(program)
+    known_program = sp.load(program)
     for name in ("table.obj", "cloud.xyz"):
         row = json.loads(run("evaluate", "table.json", name, "--json", "--points", 1000, "--seed", 3).out)["rows"][0]
-        known = sp.evaluate(known_program, name, frame, points=1000, seed=3)
-        loaded = sp.evaluate(known_program, load_shape(name), frame, points=1000, seed=3)
+        known = sp.evaluate(known_program, name, points=1000, seed=3)
+        loaded = sp.evaluate(known_program, load_shape(name), points=1000, seed=3)
         assert {name: value for name, value in asdict(known).items() if value == value} == row
         assert repr(loaded) == repr(known)
     with pytest.raises(sp.InputError, match="other axes than the target"):
-        sp.evaluate(known_program, replace(load_shape("cloud.xyz"), source=None), frame)
+        sp.evaluate(known_program, replace(load_shape("cloud.xyz"), source=None))
     result = inference.Result(PROGRAM, PROGRAM.snap(), {}, "", (), 0.0)
     assert sp.evaluate(result, "table.obj").cd == sp.evaluate(PROGRAM, load_shape("table.obj")).cd
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from commands import FRAME, PROGRAM, Run, table
 
 from shapeprog import inference
 from shapeprog.data.shape import unit_of_result
-from shapeprog.formats import export, load, load_with_frame
+from shapeprog.formats import export, load
 from shapeprog.language.convert import placed
 from shapeprog.language.dimensions import in_unit
 from shapeprog.language.free import numbers
@@ -41,7 +42,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Inference that always finds the same table, at once."""
 
     def infer(shape, *, unit, **_):
-        program = in_readable_unit(PLACED, unit_of_result(shape, PLACED, unit))
+        program = replace(in_readable_unit(PLACED, unit_of_result(shape, PLACED, unit)), frame=shape.frame)
         return inference.Result(program, PROGRAM.snap(), {}, "Stopped at once.", (), seconds=0.1)
 
     monkeypatch.setattr(inference, "infer", infer)
@@ -61,7 +62,7 @@ def test_infer_writes_programs_in_the_unit_of_the_object(
     assert "# unit: cm\n" in ended.out
     assert ("assumed to be m, so that the longest side is 2 m" in ended.out) == (not options)
     assert "IoU 1.000" in ended.out
-    program, frame = load_with_frame(tmp_path / "res" / "table.shape")
+    program = load(tmp_path / "res" / "table.shape")
     assert program.unit is not None
     assert (program.unit.name, program.unit.per_cell) == ("cm", pytest.approx(per_cell))
     assert program == load(tmp_path / "res" / "table.json")
@@ -72,7 +73,6 @@ def test_infer_writes_programs_in_the_unit_of_the_object(
     assert run("export", "res/table.shape", "again.glb").code == 0
     for made in ("res/table.glb", "again.glb"):
         np.testing.assert_allclose(trimesh.load(tmp_path / made).bounds, source, atol=0.002)
-    assert frame is not None
     rows = [run("evaluate", f"res/table.{end}", "table.obj", "--json").out for end in ("shape", "json")]
     distances = [json.loads(row)["rows"][0]["cd"] for row in rows]
     assert distances[0] == pytest.approx(distances[1])
@@ -103,13 +103,13 @@ def test_meshes_are_exported_in_the_unit_that_is_asked_for(run: Run, tmp_path: P
 def test_export_writes_programs_in_another_unit(run: Run, tmp_path: Path) -> None:
     export(parse(NAMED), tmp_path / "legs.shape", FRAME)
     assert run("export", "legs.shape", "cm.shape", "--unit", "cm").code == 0
-    _, frame = load_with_frame(tmp_path / "cm.shape")
+    frame = load(tmp_path / "cm.shape").frame
     assert "width, depth, height = 66.667, 66.667, 200\nn = 2\n" in (tmp_path / "cm.shape").read_text()
     assert run("export", "cm.shape", "mm.json", "--unit", "mm", "--set", "width=80").code == 0
-    other, kept = load_with_frame(tmp_path / "mm.json")
+    other = load(tmp_path / "mm.json")
     assert frame is not None
-    assert kept is not None
-    np.testing.assert_allclose(kept.matrix(), frame.matrix(), rtol=1e-7)
+    assert other.frame is not None
+    np.testing.assert_allclose(other.frame.matrix(), frame.matrix(), rtol=1e-7)
     assert [each.value for each in names(other)] == [800, pytest.approx(666.67), 2000, 2, pytest.approx(633.33)]
     assert run("export", "mm.json", "back.shape", "--unit", "cells").code == 0
     assert (tmp_path / "back.shape").read_text().splitlines()[1] == "width, depth, height = 9.6, 8.00004, 24"

@@ -24,11 +24,11 @@ from shapeprog.data import load
 from shapeprog.data.loading import ARRAY_SUFFIXES
 from shapeprog.data.synthetic.shapes import shapes_of
 from shapeprog.errors import InputError, OutputError, ProgramError, ShapeProgError
-from shapeprog.formats import FORMATS, Format, export, format_of, listed, load_with_frame, suffixes
+from shapeprog.formats import FORMATS, Format, export, format_of, listed, suffixes
 from shapeprog.formats.colours import colour
 from shapeprog.formats.files import program_files
 from shapeprog.formats.frames import frame_comment, frame_of_grid, in_grid_of, placement, scale_of
-from shapeprog.formats.json_form import program_to_json, result_from_json
+from shapeprog.formats.json_form import program_from_json, program_to_json
 from shapeprog.formats.parts import crease_normals, parts, solid
 from shapeprog.formats.shape import program_in, program_text
 from shapeprog.geometry.primitives.cylinder import CYLINDER
@@ -55,7 +55,7 @@ def lies(suffix: str, frame: Frame | None = None) -> Frame:
     """Where the table is in a file."""
     chosen = format_of(f"a{suffix}")
     assert chosen is not None
-    found = placement(chosen, PROGRAM, frame).frame
+    found = placement(chosen, replace(PROGRAM, frame=frame)).frame
     assert found is not None
     return found
 
@@ -125,16 +125,6 @@ def test_a_program_without_a_frame_stands_upright_for_the_loader(tmp_path: Path)
         assert shape.voxels[26:28].mean() > 4 * shape.voxels[8:20].mean(), f"{suffix}: the top is not on top"
 
 
-def test_text_and_json_come_back_with_their_frame(tmp_path: Path):
-    for suffix in suffixes("program"):
-        program, frame = load_with_frame(export(PROGRAM, tmp_path / f"a{suffix}", FRAME))
-        assert program == PROGRAM
-        close(frame, FRAME)
-        assert load_with_frame(export(PROGRAM, tmp_path / f"b{suffix}")) == (PROGRAM, None)
-    assert (tmp_path / "b.shape").read_text() == format_program(PROGRAM)
-    assert json.loads(program_to_json(PROGRAM, FRAME, reason="done"))["reason"] == "done"
-
-
 @pytest.mark.parametrize("suffix", [s for s in suffixes() if s not in (".step", ".stp")])
 def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch):
     path = tmp_path / f"table{suffix}"
@@ -163,9 +153,7 @@ def test_errors_say_what_to_do(tmp_path: Path):
         export(parse("leg(at=(0, 0, 0), size=(0, 2, 2))"), tmp_path / "table.stl")
     (tmp_path / "cut.json").write_text(program_to_json(PROGRAM)[:-30])
     with pytest.raises(ProgramError, match="cut off"):
-        load_with_frame(tmp_path / "cut.json")
-    with pytest.raises(InputError, match=r"\.shape or \.json"):
-        load_with_frame(tmp_path / "table.glb")
+        sp.load(tmp_path / "cut.json")
 
 
 def test_every_program_file_reads_back_with_its_frame(tmp_path: Path):
@@ -173,9 +161,11 @@ def test_every_program_file_reads_back_with_its_frame(tmp_path: Path):
         path = tmp_path / f"table{suffix}"
         for frame in (FRAME, None):
             sp.save(PROGRAM, path, frame)
-            program, read = sp.load_with_frame(path)
-            assert program == sp.load(path) == PROGRAM
-            close(read, frame)
+            assert sp.load(path) == PROGRAM
+            close(sp.load(path).frame, frame)
+    assert (tmp_path / "table.shape").read_text() == format_program(PROGRAM)
+    assert parse(program_text(replace(PROGRAM, frame=FRAME))) == PROGRAM
+    assert json.loads(program_to_json(PROGRAM, FRAME, reason="done"))["reason"] == "done"
     text = tmp_path / "table.txt"
     text.write_text(TEXT)
     assert sp.load(text) == PROGRAM
@@ -246,12 +236,12 @@ def test_each_suffix_has_one_declaration_and_every_readable_shape_states_its_axe
 
 @pytest.mark.parametrize("each", FORMATS, ids=lambda each: each.name)
 def test_the_functions_that_a_declaration_names_are_there_and_take_its_options(each: Format):
-    for place, first in ((each.reader, ["path"]), (each.writer, ["program", "frame"])):
+    for place, first in ((each.reader, ["text", "name"]), (each.writer, ["program"])):
         if place:
             function = pkgutil.resolve_name(f"shapeprog.formats.{place}")
             assert list(inspect.signature(function).parameters)[: len(first)] == first
     if each.writer:
-        assert set(each.options) <= {"unit", "stem", "resolution", "points", "seed", "more"}
+        assert set(each.options) <= {"frame", "unit", "stem", "resolution", "points", "seed", "more"}
 
 
 def test_help_and_errors_list_the_declared_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -267,13 +257,6 @@ def test_step_without_its_library_names_the_extra(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(OutputError, match=r"pip install build123d"):
         export(PROGRAM, tmp_path / "table.step")
-
-
-def test_frames_survive_as_a_comment():
-    program, frame = program_in(frame_comment(FRAME, PROGRAM) + TEXT, "x")
-    assert program == parse(frame_comment(FRAME, PROGRAM) + TEXT) == PROGRAM
-    close(frame, FRAME)
-    assert program_in(TEXT, "x")[1] is None
 
 
 PLACED = """\
@@ -316,30 +299,25 @@ def test_what_is_saved_and_loaded_lies_at_the_same_place_in_the_world(
     assert source.scale is not None
     # inference has a grid of its own, in which the longest side of the whole need not be 24 cells
     other = Scale(source.scale.cells_per_unit * grid, source.scale.floor + grid, grid / 3)
-    program = evaluated(replace(source, scale=other))
     rotation = turned(seed) if axes is None else grid_axes(*axes).tolist()
     frame = Frame(scale, tuple(scale * value for value in middle), tuple(map(tuple, rotation)))
-    text = program_text(program, frame)
+    program = replace(evaluated(replace(source, scale=other)), frame=frame)
+    text = program_text(program)
     assert text.startswith("# placed: up " if axes is None else f"# placed: up {axes[0]}, front {axes[1]}, origin ")
-    read, kept = program_in(text, "x") if suffix == ".shape" else both(program_to_json(program, frame))
-    assert kept is not None
+    read = program_in(text, "x") if suffix == ".shape" else program_from_json(program_to_json(program))
+    assert read.frame is not None
     for one, two in zip(parts(program), parts(read), strict=True):
-        there, back = frame.to_world(one.vertices), kept.to_world(two.vertices)
+        there, back = frame.to_world(one.vertices), read.frame.to_world(two.vertices)
         np.testing.assert_allclose(back, there, rtol=0, atol=24e-6 * scale)
-    assert program_text(read, kept).splitlines()[1:] == text.splitlines()[1:]
-    for one, two in zip(parts(program), parts(in_grid_of(read, kept, frame)), strict=True):
+    assert program_text(read).splitlines()[1:] == text.splitlines()[1:]
+    for one, two in zip(parts(program), parts(in_grid_of(read, frame)), strict=True):
         np.testing.assert_allclose(two.vertices, one.vertices, rtol=0, atol=24e-6)
-
-
-def both(text: str) -> tuple[Program, Frame | None]:
-    result = result_from_json(text, "x")
-    return result.program, result.frame
 
 
 @pytest.mark.parametrize("unit", ["", "# unit: m\n"])
 def test_the_size_of_a_unit_is_written_without_the_error_of_rounding(unit: str) -> None:
     program = parse(unit + "width, depth, height = 1, 0.5, 0.5\ntop(height=0.1)")
-    written = frame_comment(Frame(scale=(1 - 3e-8) / 24), program)
+    written = frame_comment(replace(program, frame=Frame(scale=(1 - 3e-8) / 24)))
     assert written.endswith(f"1 unit = 1{' m' if unit else ''}\n")
 
 
@@ -347,13 +325,13 @@ def test_the_frame_of_a_placed_text_is_a_line_to_read():
     scale = scale_of(parse(PLACED))
     metres = frame_of_grid(Frame(0.01, (0, 0.5, 0), ((1, 0, 0), (0, 0, 1), (0, -1, 0))), scale)
     line = "# placed: up y, front z, origin 0 0.5 0, 1 unit = 0.01 m"
-    assert program_text(parse(PLACED), metres) == f"{line}\n{PLACED}"
-    assert program_text(parse(PLACED), None) == PLACED
-    read, frame = program_in(f"# a chair\r\n{line}\r\n" + PLACED.replace("\n", "\r\n"), "x")
+    assert program_text(replace(parse(PLACED), frame=metres)) == f"{line}\n{PLACED}"
+    assert program_text(parse(PLACED)) == PLACED
+    read = program_in(f"# a chair\r\n{line}\r\n" + PLACED.replace("\n", "\r\n"), "x")
     assert format_program(read) == PLACED.replace("\nwidth", "\n# a chair\n\nwidth", 1)
-    assert frame is not None
-    np.testing.assert_allclose(frame.centre, metres.centre, atol=1e-12)
-    assert program_in(PLACED + line, "x")[1] is None, "below the first statement it is a comment"
+    assert read.frame is not None
+    np.testing.assert_allclose(read.frame.centre, metres.centre, atol=1e-12)
+    assert program_in(PLACED + line, "x").frame is None, "below the first statement it is a comment"
 
 
 @pytest.mark.parametrize(

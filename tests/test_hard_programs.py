@@ -19,7 +19,7 @@ from shapeprog.cli import main, writing
 from shapeprog.data import loading
 from shapeprog.errors import InputError, OutputError, ProgramError, ShapeProgError
 from shapeprog.files import write_text
-from shapeprog.formats import export, load_with_frame, save
+from shapeprog.formats import export, load, save
 from shapeprog.formats.json_form import program_from_json, program_to_json, read_result
 from shapeprog.formats.parts import crease_normals, parts
 from shapeprog.formats.shape import LARGEST_FILE, program_in, read_text
@@ -71,14 +71,14 @@ def test_texts_are_as_long_as_can_be_read_back() -> None:
 def test_only_regular_files_of_a_programs_size_are_read(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.shape")
     with pytest.raises(InputError, match="a pipe, a socket or a device"):
-        load_with_frame(tmp_path / "pipe.shape")
+        load(tmp_path / "pipe.shape")
     (tmp_path / "endless.json").symlink_to("/dev/zero")
     with pytest.raises(InputError, match="a pipe, a socket or a device"):
-        load_with_frame(tmp_path / "endless.json")
+        load(tmp_path / "endless.json")
     with open(tmp_path / "large.shape", "wb") as file:
         file.truncate(LARGEST_FILE + 1)
     with pytest.raises(InputError, match="larger than 16 MB"):
-        load_with_frame(tmp_path / "large.shape")
+        load(tmp_path / "large.shape")
     for name in ("a\0b.shape", "a" * 5000 + ".shape"):
         with pytest.raises(InputError):
             read_text(name)
@@ -157,7 +157,7 @@ def test_the_input_is_opened_only_beside_its_program_or_where_the_user_says(
     path.write_text(program_to_json(PROGRAM, source=source.format(places)))
     opened: list[str] = []
     monkeypatch.setattr(loading, "load", lambda place, **_: opened.append(str(place)) or PLATE)
-    found, *_ = writing._input_and_scores(path, None, None if named is None else places / named)
+    found, *_ = writing._input_and_scores(path, PROGRAM, None if named is None else places / named)
     assert (len(opened), found is not None) == ((1, True) if shown else (0, False))
 
 

@@ -16,7 +16,7 @@ from shapeprog.data.loading import load_shape
 from shapeprog.data.random import random_program
 from shapeprog.data.shape import Shape, unit_of_result
 from shapeprog.errors import ShapeProgError
-from shapeprog.formats import export, load_with_frame, save
+from shapeprog.formats import export, load, save
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.inference import Settings, infer
 from shapeprog.inference.choice.connecting import floating
@@ -107,10 +107,10 @@ def test_a_rounded_program_is_read_back_and_lies_where_it_lay(name: str, tmp_pat
     frame = Frame.around([1, 2, 3], [1.9, 2.4, 3.7], grid_axes("+z", "-y"))
     rounded = in_readable_unit(program, Unit.of(frame, name) if name else Unit("", frame.scale))
     save(rounded, tmp_path / "leg.shape", frame)
-    again, other = load_with_frame(tmp_path / "leg.shape")
+    again = load(tmp_path / "leg.shape")
     assert format_program(again) == format_program(rounded)
-    assert other is not None
-    one, two = (f.to_world(part_meshes(unroll(p))[0].vertices) for p, f in ((program, frame), (again, other)))
+    assert again.frame is not None
+    one, two = (f.to_world(part_meshes(unroll(p))[0].vertices) for p, f in ((program, frame), (again, again.frame)))
     assert abs(one - two).max() <= (TOLERANCES[0] + 1e-3) * frame.scale
 
 
@@ -145,10 +145,10 @@ def test_an_stl_in_millimetres_becomes_a_program_in_millimetres_that_lies_on_it(
     sizes = {named.name: named.value for named in names(program)}
     assert [sizes[word] for word in ("width", "depth", "height")] == pytest.approx([1200, 900, 1200], abs=1)
     assert all(value == round(value) for value in sizes.values())
-    save(program, tmp_path / "table.shape", shape.frame)
-    again, frame_of_text = load_with_frame(tmp_path / "table.shape")
-    assert frame_of_text is not None
-    vertices = [frame_of_text.to_world(part.vertices) for part in part_meshes(unroll(again))]
+    save(program, tmp_path / "table.shape")
+    again = load(tmp_path / "table.shape")
+    assert again.frame is not None
+    vertices = [again.frame.to_world(part.vertices) for part in part_meshes(unroll(again))]
     corners = shape.frame.to_world(shape.vertices)
     for end in (np.min, np.max):
         np.testing.assert_allclose(end(np.concatenate(vertices), 0), end(corners, 0), atol=2)

@@ -65,11 +65,11 @@ def test_a_program_that_was_set_reads_back_with_its_text_in_a_grid_of_its_own(tm
     assert parse(format_program(parsed)) == parsed
     frame, changed = sp.Frame(2.0, (1.0, 2.0, 3.0)), sp.set(parsed, height=120)
     save(changed, tmp_path / "a.shape", frame)
-    again, own = sp.load_with_frame(tmp_path / "a.shape")
+    again = sp.load(tmp_path / "a.shape")
     assert again != changed
     assert format_program(again) == format_program(changed)
-    assert own is not None
-    before, after = (place.to_world(sp.unroll(each).centre) for each, place in ((changed, frame), (again, own)))
+    assert again.frame is not None
+    before, after = (place.to_world(sp.unroll(each).centre) for each, place in ((changed, frame), (again, again.frame)))
     torch.testing.assert_close(before, after, atol=1e-5, rtol=0)
 
 

@@ -25,7 +25,6 @@ from shapeprog.formats.samples import npy
 from shapeprog.geometry import mesh, surface
 from shapeprog.geometry.arrays import table_of
 from shapeprog.geometry.distance import each_distance, nearest_primitive
-from shapeprog.space import Frame
 from shapeprog.view.viewer import viewer
 
 ROW = "for i in translate(100000, by=(0, 0, 3)):\n    leg(at=(0, 0, 0), size=(2, 2, 2))\n"
@@ -99,12 +98,12 @@ def test_cells_and_lists_of_solids_need_no_limit_of_triangles(monkeypatch):
     program = parse(
         "width, depth, height = 24, 24, 24\nfor _ in translate(3, x=8):\n    cushion(left=0, width=8, edge=1)\n"
     )
-    shape, before = Shape("a", np.ones((32, 32, 32), bool)), (npy(program, Frame()), program_to_json(program))
+    shape, before = Shape("a", np.ones((32, 32, 32), bool)), (npy(program), program_to_json(program))
     monkeypatch.setattr(mesh, "MOST_TRIANGLES", 12)
-    assert before == (npy(program, Frame()), program_to_json(program))
+    assert before == (npy(program), program_to_json(program))
     assert len(json.loads(before[1])["solids"]) == 3
     with pytest.raises(ShapeProgError, match="resolution"):
-        npy(program, Frame(), resolution=513)
+        npy(program, resolution=513)
     far = parse("box(at=(1e8, 0, 0), size=(1, 1, 1))\nseat(box(at=(0, 0, 0), size=(1, 1, 1)))")
     assert evaluate_program(far, replace(shape, points=np.ones((100, 3), np.float32))).iou == 0
 

@@ -6,7 +6,7 @@ from .data.shape import Shape
 from .errors import InputError, OutputError, ProgramError, ShapeProgError
 from .evaluation.metrics import Metrics
 from .evaluation.scoring import evaluate
-from .formats.files import export, load, load_with_frame, save
+from .formats.files import export, load, save
 from .formats.json_form import program_from_json, program_to_json
 from .formats.plugins import load_statements
 from .geometry.losses import chamfer, coverage
@@ -37,7 +37,7 @@ __all__ = [
     "OutputError", "Parametric", "Program", "ProgramError", "Scene", "Shape", "ShapeProgError", "Source", "Unit",
     "chamfer", "coverage", "decode", "encode", "evaluate", "evaluated", "export", "format_program", "in_unit",
     "infer", "inline", "learn", "liang2022", "load", "load_all", "load_library", "load_shape", "load_statements",
-    "load_with_frame", "loop", "names", "parse", "program_from_json", "program_to_json",
-    "random_program", "refine", "sample", "save", "save_library", "set", "shape_from_mesh",
-    "shape_from_points", "shape_from_voxels", "statement", "unroll", "with_library",
+    "loop", "names", "parse", "program_from_json", "program_to_json", "random_program", "refine", "sample", "save",
+    "save_library", "set", "shape_from_mesh", "shape_from_points", "shape_from_voxels", "statement", "unroll",
+    "with_library",
 ]  # fmt: skip

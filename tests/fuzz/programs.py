@@ -6,6 +6,7 @@ import functools
 import itertools
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from random import Random
 
 from . import crafted_parts, crafted_programs
@@ -108,8 +109,7 @@ def seeds() -> dict[str, bytes]:
 
     import shapeprog as sp
     from shapeprog.data.random import random_program
-    from shapeprog.formats.frames import frame_comment
-    from shapeprog.formats.json_form import program_to_json
+    from shapeprog.formats.shape import program_text
     from shapeprog.language.program import Program
 
     found, frame = {}, sp.Frame(0.04, (0.0, 0.5, 0.0))
@@ -124,6 +124,6 @@ def seeds() -> dict[str, bytes]:
     }
     for name, program in {**furniture, **some}.items():
         more = {"snapped": "", "scores": {"iou": 0.5}, "reason": "done", "source": "stool.obj"}
-        found[f"{name}.json"] = program_to_json(program, frame, **more).encode()
-        found[f"{name}.shape"] = (frame_comment(frame, program) + sp.format_program(program)).encode()
+        found[f"{name}.json"] = sp.program_to_json(program, frame, **more).encode()
+        found[f"{name}.shape"] = program_text(replace(program, frame=frame)).encode()
     return found

@@ -43,7 +43,7 @@ def _program_file(path: Path, out: Path) -> Iterator[Use]:
     from shapeprog.formats.format import suffixes
     from shapeprog.geometry.mesh import part_meshes, union_mesh
 
-    program, frame = sp.load_with_frame(path)
+    program = sp.load(path)
     yield "text", lambda: _same(sp.parse(sp.format_program(program)), program)
     yield "JSON", lambda: _same(sp.program_from_json(sp.program_to_json(program)), program)
     yield "unroll", lambda: sp.unroll(program)
@@ -56,7 +56,7 @@ def _program_file(path: Path, out: Path) -> Iterator[Use]:
     yield "union_mesh", lambda: union_mesh(sp.unroll(program))
     for suffix in suffixes():
         if suffix not in (".step", ".stp"):  # through build123d, a second for each part
-            yield f"export {suffix}", lambda: sp.export(program, out / f"program{suffix}", frame)  # noqa: B023
+            yield f"export {suffix}", lambda: sp.export(program, out / f"program{suffix}")  # noqa: B023
     terminal.quiet = True
     yield "show", lambda: show_command(path, out / "page.html")
 

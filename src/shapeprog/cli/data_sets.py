@@ -182,14 +182,15 @@ def evaluate_command(
     hidden = terminal.quiet or as_json
     for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=hidden):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
-        if isinstance(prediction, SavedResult) and prediction.program.source is not None:
-            terminal.warn(path, *prediction.program.source.warnings)
+        program = prediction.program if isinstance(prediction, SavedResult) else None
+        if program is not None and program.source is not None:
+            terminal.warn(path, *program.source.warnings)
         try:
-            if isinstance(prediction, SavedResult) and target is not None and not (up or front):
-                target = scoring.in_pose_of(prediction, target, points, seed)
+            if program is not None and target is not None and not (up or front):
+                target = scoring.in_pose_of(program, target, points, seed)
             rows.append(scoring.measure(prediction, target, points, seed))
-            if isinstance(prediction, SavedResult) and target is not None and target.name in files:
-                rows[-1] = scoring.with_parts(rows[-1], prediction, target, files[target.name], seed)
+            if program is not None and target is not None and target.name in files:
+                rows[-1] = scoring.with_parts(rows[-1], program, target, files[target.name], seed)
         except ShapeProgError as mistake:
             failures.append(ShapeProgError(f"prediction {name}: {mistake.message}", mistake.hint))
         except Exception as unexpected:

@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from shapeprog.data.loading import path_of
 from shapeprog.data.shape import Shape
@@ -37,10 +38,8 @@ def measured(result: Result, shape: Shape, seed: int) -> Result:
 
 def document(result: Result, shape: Shape) -> str:
     """The JSON of a result; without its seconds, so that the same seed writes the same bytes."""
-    extra = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
-    return program_to_json(
-        result.program, shape.frame, scores=result.scores, reason=result.reason, source=path_of(shape), **extra
-    )
+    extra: dict[str, Any] = {} if result.snapped is None else {"snapped": format_program(result.snapped)}
+    return program_to_json(result.program, scores=result.scores, reason=result.reason, source=path_of(shape), **extra)
 
 
 def write(result: Result, shape: Shape, folder: Path, stem: str) -> list[str]:
@@ -50,11 +49,11 @@ def write(result: Result, shape: Shape, folder: Path, stem: str) -> list[str]:
     """
     text = folder / f"{stem}.shape"
     with atomic_path(text) as new_text, atomic_path(folder / f"{stem}.json") as new_json:
-        new_text.write_bytes(program_text(result.program, shape.frame).encode("utf-8", "surrogateescape"))
+        new_text.write_bytes(program_text(result.program).encode("utf-8", "surrogateescape"))
         new_json.write_bytes(document(result, shape).encode("utf-8", "surrogateescape"))
         text.unlink(missing_ok=True)  # the JSON, which holds it too, is renamed first
     if result.program.size:
-        export(result.program, folder / f"{stem}.glb", shape.frame)
+        export(result.program, folder / f"{stem}.glb")
     return [f"{stem}{suffix}" for suffix in (".json", ".shape", *([".glb"] if result.program.size else []))]
 
 

@@ -280,16 +280,16 @@ def load_libraries(files: Sequence[Path] | None, shipped: bool) -> list[Library]
     return [*map(load_library, libraries), *([load_library()] if shipped else [])]
 
 
-def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Frame | None]:
-    """The program and frame of a file, with other numbers for its names as ``--set`` has them; prints its warnings."""
+def read_program_file(path: Path, changes: Sequence[str] | None = None) -> Program:
+    """The program of a file, with other numbers for its names as ``--set`` has them; prints its warnings."""
     from shapeprog.cli.changes import changed
-    from shapeprog.formats import load_with_frame
+    from shapeprog.formats import load
 
-    program, frame = load_with_frame(path)
+    program = load(path)
     warn(path, *(program.source.warnings if program.source else ()))
     edited, doubts = changed(program, changes or ())
     warn(path, *doubts)
-    return edited, frame
+    return edited
 
 
 def warn(path: Path, *warnings: str) -> None:

@@ -45,7 +45,7 @@ def tidy_command(
 
     terminal.check_units(unit, file_unit, needed=True)
     libraries = terminal.load_libraries(modules, library)
-    given, frame = terminal.read_program_file(program)
+    given = terminal.read_program_file(program)
     terminal.check_free([out] if out else [], overwrite, program)
     if not given.size:
         raise InputError(f"{program} draws nothing", "give a program with at least one drawing statement")
@@ -55,12 +55,12 @@ def tidy_command(
         raise InputError(f"{program} has groups or functions already, which tidy would write out", cure)
     if any(getattr(line, "text", "") or getattr(line, "note", "") for line in lines):  # a comment, or a line with one
         terminal.warn(program, "its comments are left out")
-    wanted = asked_unit(given, frame, unit, file_unit or "", program)
+    wanted = asked_unit(given, unit, file_unit or "", program)
     result = tie(given, evidence_of_program(given, seed), price=price, known=True, seed=seed)
     if libraries:
         result = with_library(result, joined(libraries))
     result = in_readable_unit(result, wanted)
     if out is not None:
-        save(result, out, frame)
+        save(result, out, given.frame)
     terminal.print_program(result)
     terminal.note(f"Free numbers: {numbers(given)} before, {numbers(result)} now.")

@@ -18,6 +18,7 @@ from shapeprog.formats.format import format_of, program_suffixes, suffixes
 
 if TYPE_CHECKING:
     from shapeprog.data.shape import Shape
+    from shapeprog.language.program import Program
     from shapeprog.space import Frame
 
 PAGES = (".html", ".htm")
@@ -71,23 +72,23 @@ def export_command(
         if "=" in path.name and CHANGE.fullmatch(str(path)) and format_of(path) is None:
             raise OutputError(f"{path} is no file to write", f"changes of numbers follow --set: --set {path}")
     formats = [written_format(path) for path in outputs]
-    loaded, frame = terminal.read_program_file(program, changes)
+    loaded = terminal.read_program_file(program, changes)
     terminal.check_free(outputs, overwrite, program)
     makers = any(file_format.maker for file_format in formats)
     has_unit = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
-    if frame is not None and makers and not has_unit and SPAN * frame.scale > MOST_METRES:
-        terminal.note(terminal.assumed(frame))
+    if loaded.frame is not None and makers and not has_unit and SPAN * loaded.frame.scale > MOST_METRES:
+        terminal.note(terminal.assumed(loaded.frame))
     asked: dict[str, Any] = {"unit": unit or "", "file_unit": file_unit or "", "up": up, "on_input": on_input}
     failures: list[ShapeProgError] = []
     for path in outputs:
         try:
-            export(loaded, path, frame, **asked)
+            export(loaded, path, **asked)
         except ShapeProgError as error:  # the other files do not depend on this one
             failures.append(error)
             continue
         terminal.say(f"wrote {path}")
         if path.suffix.lower() == ".csv":
-            cuts = listed_cuts(loaded, frame, **asked)
+            cuts = listed_cuts(loaded, **asked)
             terminal.say(cuts.table)
             terminal.warn(path, *cuts.warnings)
     terminal.finish(failures, terminal.FAILED if len(failures) < len(outputs) else terminal.MISTAKE)
@@ -141,16 +142,16 @@ def _draw(
     from shapeprog.view import picture, viewer
 
     terminal.load_modules(modules)
-    loaded, frame = terminal.read_program_file(program, changes)
+    loaded = terminal.read_program_file(program, changes)
     if not loaded.size and not loaded.body and loaded.scale is None:
         raise InputError(f"{program} is empty", f"{BEGIN} and a part below it, such as box(height=2)")
     if not loaded.size:
         terminal.warn(program, "nothing is drawn: write a part below the size, such as box(height=2)")
-    shape, scores, lacking = _input_and_scores(program, frame, named, changes)
+    shape, scores, lacking = _input_and_scores(program, loaded, named, changes)
     if lacking:
         terminal.note(f"The input is not shown: {lacking}. Give its file with --shape.")
     if output.suffix.lower() in PAGES:
-        viewer(loaded, output, shape=shape, title=program.stem, scores=scores, frame=frame)
+        viewer(loaded, output, shape=shape, title=program.stem, scores=scores)
     else:
         picture(shape, loaded, output, title=program.stem, scores=scores)
     terminal.say(f"wrote {output}")
@@ -186,11 +187,11 @@ def sheet_command(
     failures: list[ShapeProgError] = []
     for path in program_files(folder)[:most]:
         try:
-            loaded, frame = terminal.read_program_file(path)
+            loaded = terminal.read_program_file(path)
         except ShapeProgError as error:
             failures.append(error)
             continue
-        input_shape, scores, lacking = _input_and_scores(path, frame, shape)
+        input_shape, scores, lacking = _input_and_scores(path, loaded, shape)
         if input_shape is None:
             missing[path.stem] = lacking or "none is named in a .json"
         items.append(Item(path.stem, input_shape, loaded, scores_text(scores, loaded)[0]))
@@ -223,7 +224,7 @@ def statements_command(
 
 
 def _input_and_scores(
-    program: Path, frame: Frame | None, named: Path | None, changes: Sequence[str] | None = None
+    path: Path, program: Program, named: Path | None, changes: Sequence[str] | None = None
 ) -> tuple[Shape | None, Mapping[str, float], str]:
     """The input of a program and the scores in its .json file, unless ``--set`` changes it; and why an input that is
     named or recorded is not shown: a picture without the input is better than none.
@@ -232,20 +233,19 @@ def _input_and_scores(
     the program, or in the folder that the user names and deeper: a program from elsewhere may name any file.
     """
     from shapeprog.formats.json_form import SavedResult, read_result
-    from shapeprog.language.program import Program
 
-    is_json = not changes and program.suffix.lower() == ".json"
-    result = read_result(program) if is_json else SavedResult(Program())
+    is_json = not changes and path.suffix.lower() == ".json"
+    result = read_result(path) if is_json else SavedResult(program)
     if named is not None and not named.is_dir():
-        return _as_inferred(named, frame), result.scores, ""
+        return _as_inferred(named, program.frame), result.scores, ""
     if named is not None and not is_json:  # the text may have been edited, so that the scores are of another program
         with suppress(ShapeProgError):
-            result = SavedResult(Program(), source=read_result(program.with_suffix(".json")).source)
+            result = SavedResult(program, source=read_result(path.with_suffix(".json")).source)
     if not result.source:
         return None, result.scores, "" if named is None else "no .json of its name beside the program names one"
-    path, mark, member = result.source.partition("#")
-    recorded = Path(path)
-    files = program.parent.iterdir() if named is None else named.rglob("*")
+    file_name, mark, member = result.source.partition("#")
+    recorded = Path(file_name)
+    files = path.parent.iterdir() if named is None else named.rglob("*")
     candidates = sorted(
         file for file in files if file.name == recorded.name and file.is_file() and not file.is_symlink()
     )
@@ -254,7 +254,7 @@ def _input_and_scores(
         return None, result.scores, "several files have its name, and none fits its path in the .json best"
     try:
         best = candidates[agreement.index(max(agreement))]
-        return _as_inferred(f"{best}{mark}{member}", frame), result.scores, ""
+        return _as_inferred(f"{best}{mark}{member}", program.frame), result.scores, ""
     except (ValueError, ShapeProgError):
         return None, result.scores, "it was not found, or cannot be read"
 

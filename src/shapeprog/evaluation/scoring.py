@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import reprlib
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -26,12 +25,12 @@ from shapeprog.errors import InputError, ShapeProgError
 from shapeprog.evaluation.likeness import Triangles
 from shapeprog.evaluation.metrics import POINTS, Metrics, distances, evaluate_program, with_likeness
 from shapeprog.evaluation.parts import part_scores
-from shapeprog.formats.files import load_with_frame, program_files
+from shapeprog.formats.files import load, program_files
 from shapeprog.formats.format import suffixes
 from shapeprog.formats.frames import in_grid_of
 from shapeprog.formats.json_form import SavedResult, read_result
 from shapeprog.geometry.voxelise import voxelise_mesh, voxelise_points
-from shapeprog.language.program import Program, frame_of
+from shapeprog.language.program import Program, program_of
 from shapeprog.language.unroll import unroll
 from shapeprog.space import Array, Frame
 
@@ -74,14 +73,10 @@ def evaluate(
     check_number("seed", seed, 0, MOST_SEED, whole=True)
     is_path = isinstance(prediction, str | os.PathLike) and "\n" not in str(prediction)  # else it is a text
     given: Any = _read(Path(prediction)) if is_path else prediction  # type: ignore[arg-type]
-    program, snapped = getattr(given, "program", given), getattr(given, "snapped", None)
-    if not isinstance(program, Program):
-        cure = "give a program, the path of its file, or the result of sp.infer"
-        raise ShapeProgError(f"{reprlib.repr(prediction)} is no program", cure)
-    frame = frame_of(program, frame)
-    result = SavedResult(program, frame, snapped)
+    program = program_of(given, frame)
+    frame, result = program.frame, SavedResult(program, getattr(given, "snapped", None))
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
-    shape = in_pose_of(result, shape, points, seed)
+    shape = in_pose_of(program, shape, points, seed)
     if shape is target and shape.scan is not None:
         shape = replace(shape, points=some(shape.scan, 2 * points, seed))
     if frame is not None and not np.allclose(frame.axes, shape.frame.axes, atol=1e-6):
@@ -114,7 +109,7 @@ def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str,
 def _read(file: Path) -> SavedResult:
     """The contents of a program file."""
     with in_words(file, "a program"):
-        return read_result(file) if file.suffix.lower() == ".json" else SavedResult(*load_with_frame(file))
+        return read_result(file) if file.suffix.lower() == ".json" else SavedResult(load(file))
 
 
 def read_targets(
@@ -135,9 +130,9 @@ def read_targets(
     return shapes, failures
 
 
-def in_pose_of(prediction: Prediction, target: Shape, points: int, seed: int) -> Shape:
-    """The target, loaded again in the axes stored with a predicted program; unchanged for meshes and point clouds."""
-    frame, path = None if isinstance(prediction, Shape) else prediction.frame, path_of(target)
+def in_pose_of(program: Program, target: Shape, points: int, seed: int) -> Shape:
+    """The target, loaded again in the axes of the frame of a predicted program."""
+    frame, path = program.frame, path_of(target)
     if frame is None or path is None or np.allclose(frame.axes, target.frame.axes, atol=1e-6):
         return target
     return load_in_axes(path, frame, points=2 * points, seed=seed)
@@ -151,15 +146,14 @@ def measure(prediction: Prediction | ShapeProgError, target: Shape | None, point
         raise InputError("there is no target of this name", "give both the same name")
     if isinstance(prediction, Shape):
         return _measure_shape(prediction, target, points, seed)
-    program = in_grid_of(prediction.program, prediction.frame, target.frame)
+    program = in_grid_of(prediction.program, target.frame)
     return evaluate_program(program, target, prediction.snapped, points, seed, looks=True)
 
 
-def with_parts(row: Metrics, prediction: SavedResult, target: Shape, files: list[Path], seed: int) -> Metrics:
+def with_parts(row: Metrics, program: Program, target: Shape, files: list[Path], seed: int) -> Metrics:
     """The measures with recall and precision of the physical parts in ``files``, see :func:`read_parts`."""
     parts = [Triangles(target.frame.to_grid(vertices), faces) for vertices, faces in read_parts(files)]
-    program = in_grid_of(prediction.program, prediction.frame, target.frame)
-    return replace(row, **part_scores(parts, unroll(program), seed)._asdict())
+    return replace(row, **part_scores(parts, unroll(in_grid_of(program, target.frame)), seed)._asdict())
 
 
 def _measure_shape(prediction: Shape, target: Shape, points: int, seed: int) -> Metrics:

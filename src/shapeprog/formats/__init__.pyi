@@ -1,7 +1,7 @@
-from .files import export, load, load_with_frame, save
+from .files import export, load, save
 from .format import FORMATS, Format, format_of, listed, program_suffixes, suffixes
 
 __all__ = [
     "FORMATS", "Format",
-    "export", "format_of", "listed", "load", "load_with_frame", "program_suffixes", "save", "suffixes",
+    "export", "format_of", "listed", "load", "program_suffixes", "save", "suffixes",
 ]  # fmt: skip

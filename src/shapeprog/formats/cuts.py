@@ -127,11 +127,11 @@ def cuts_csv(program: Program, frame: Frame, unit: str = "") -> str:
     return text.getvalue()
 
 
-def listed_cuts(program: Program, frame: Frame | None = None, **asked: Any) -> CutList:
+def listed_cuts(program: Program, **asked: Any) -> CutList:
     """The cut list that :func:`shapeprog.export` writes with the same arguments."""
     chosen = format_of("a.csv")
     assert chosen is not None
-    lies = placement(chosen, program, frame, **asked)
+    lies = placement(chosen, program, **asked)
     assert lies.frame is not None
     return cut_list(program, lies.frame, lies.unit)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from shapeprog.errors import InputError, OutputError, did_you_mean
 from shapeprog.files import write_bytes
 from shapeprog.formats.format import Format, format_of, listed, program_suffixes, suffixes
 from shapeprog.formats.frames import asked_unit, placement
-from shapeprog.language.program import Program, check_program, frame_of
+from shapeprog.formats.shape import read_text
+from shapeprog.language.program import Program, program_of
 from shapeprog.space import Frame
 
 
@@ -24,17 +26,6 @@ def load(path: str | os.PathLike[str]) -> Program:
     ProgramError
         If its text is not a valid program.
     """
-    return load_with_frame(path)[0]
-
-
-def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None]:
-    """The program in a file, and its frame, which it has as ``program.frame``, too.
-
-    Raises
-    ------
-    InputError, ProgramError
-        As for :func:`load`.
-    """
     file = Path(path)
     file_format = format_of(file)
     if file_format is None or not file_format.reader:
@@ -46,7 +37,7 @@ def load_with_frame(path: str | os.PathLike[str]) -> tuple[Program, Frame | None
         ending = f"its name ends in {file.suffix!r}" if file.suffix else "its name has no suffix"
         cure = f"programs are {endings} files; infer one from a shape: shapeprog infer {file}"
         raise InputError(f"{file} holds no program: {ending}", cure)
-    return file_format.read(file)
+    return file_format.read(read_text(file), str(file))
 
 
 def program_files(folder: Path) -> list[Path]:
@@ -75,7 +66,7 @@ def save(program: Program, path: str | os.PathLike[str], frame: Frame | None = N
     Parameters
     ----------
     program
-        What to write.
+        What to write, or a result of :func:`shapeprog.infer`.
     path
         Where to; ends in .shape or .json.
     frame
@@ -121,7 +112,7 @@ def export(
     Parameters
     ----------
     program
-        What to write.
+        What to write, or a result of :func:`shapeprog.infer`.
     path
         Where to; the folder must exist.
     frame
@@ -140,23 +131,22 @@ def export(
     OutputError
         If the suffix is unknown, the program draws nothing that the format can hold, or the file cannot be written.
     """
-    check_program(program)
-    frame = frame_of(program, frame)
+    program = program_of(program, frame)
     target = Path(path)
     file_format, suffix = written_format(target), target.suffix.lower()
     if file_format.kind == "program" and unit:
         from shapeprog.language.dimensions import in_unit  # few programs are converted
 
-        asked = asked_unit(program, frame, unit, file_unit, target)
+        asked = asked_unit(program, unit, file_unit, target)
         if asked != program.unit:  # statements in cells can be in no other
             program = in_unit(program, asked, workshop=True)
-    lies = placement(file_format, program, frame, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
-    known: dict[str, int | str] = {"unit": lies.unit, "stem": target.stem}
+    lies = placement(file_format, program, unit=unit, file_unit=file_unit, up=up, on_input=on_input)
+    known: dict[str, Any] = {"frame": lies.frame, "unit": lies.unit, "stem": target.stem}
     takes = file_format.options
     for name in options.keys() - takes:
         raise OutputError(f"{suffix} takes no {name}", f"it takes {', '.join(takes - known.keys()) or 'no options'}")
     known = {name: known[name] for name in known.keys() & takes}
-    content = file_format.content(program, lies.frame, **known, **options)
+    content = file_format.content(program, **known, **options)
     for ending, part in content.items() if isinstance(content, Mapping) else [(suffix, content)]:
         file = target if ending == suffix else target.with_suffix(ending)
         write_bytes(file, part if isinstance(part, bytes) else part.encode("utf-8", "surrogateescape"))

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from shapeprog.language.program import Program
-    from shapeprog.space import Frame
 
 Kind = Literal["program", "solid", "list", "sample", "shape"]
 
@@ -51,8 +50,9 @@ class Format:
     doc
         Contents of such a file, in one line.
     reader, writer
-        ``module:function`` of this package: ``(path) -> (program, frame or None, ...)`` and ``(program, frame) ->
-        content``, perhaps with the name of the ``unit``, the ``stem`` of the file, and further options.
+        ``module:function`` of this package: ``(text, name of the file) -> program`` and ``(program) -> content``,
+        perhaps with the ``frame`` from the grid to the coordinates of the file, the name of their ``unit``, the
+        ``stem`` of the file, and further options.
     unit
         Unit of the coordinates of a file unless another is asked for; ``text`` for that of the program, empty for that
         of the input, or of the program if no input is known, ``cells`` for cells always.  Files in millimetres are for
@@ -82,25 +82,25 @@ class Format:
     @property
     def options(self) -> set[str]:
         """Further arguments of the writer."""
-        return {*inspect.signature(_function(self.writer)).parameters} - {"program", "frame"}
+        return {*inspect.signature(_function(self.writer)).parameters} - {"program"}
 
-    def read(self, path: Path) -> tuple[Program, Frame | None]:
-        """The program in a file of this format, and its frame if the file has one."""
-        program, frame, *_ = _function(self.reader)(path)
-        return program, frame
+    def read(self, text: str, name: str) -> Program:
+        """The program in the text of a file, with its frame if it has one; ``name`` stands for the file in errors."""
+        program: Program = _function(self.reader)(text, name)
+        return program
 
-    def content(self, program: Program, frame: Frame | None, **options: int | str) -> Content:
-        """What a file with the program holds; ``frame`` maps the grid to the coordinates of the file."""
-        return _function(self.writer)(program, frame, **options)
+    def content(self, program: Program, **options: Any) -> Content:
+        """What a file with the program holds."""
+        return _function(self.writer)(program, **options)
 
 
 FORMATS = (
     Format("program text", "program", (".shape",), None, "the program, with its frame in a comment where one is known",
-        reader="shape:read_shape", writer="shape:program_text"),
+        reader="shape:program_in", writer="shape:program_text"),
     Format("JSON", "program", (".json",), None, "the text with a list of the solids that it draws, for other programs",
-        reader="json_form:read_result", writer="json_form:program_to_json"),
+        reader="json_form:program_from_json", writer="json_form:program_to_json"),
     Format("plain text", "program", (".txt",), None, "program text under another suffix",
-        reader="shape:read_shape"),
+        reader="shape:program_in"),
     Format("GLB", "solid", (".glb",), Y_UP, "one named node per part, coloured by statement",
         writer="meshes:glb", unit="m"),
     Format("OBJ", "solid", (".obj",), Y_UP, "one object per part, colours in an .mtl file next to it",

@@ -64,7 +64,6 @@ class Placement(NamedTuple):
 def placement(
     file_format: Format,
     program: Program,
-    frame: Frame | None = None,
     *,
     unit: str = "",
     file_unit: str = "",
@@ -78,9 +77,7 @@ def placement(
     file_format
         The format of the file.
     program
-        What is written.
-    frame
-        From the grid to the coordinates of the input, if it is known.
+        What is written; its frame leads to the coordinates of its input, if they are known.
     unit
         Unit of the coordinates of the file: ``mm``, ``cm``, ``m``, ``in`` or ``cells``; empty for that of the format.
     file_unit
@@ -96,6 +93,7 @@ def placement(
     InputError
         If the input, the axis or the size of the object is not known, or a unit or an axis has no effect on the file.
     """
+    frame = program.frame
     if unit not in ("", CELLS):
         metres(unit)
     if up and (file_format.axes is None or file_format.unit == CELLS or file_format.kind == "list"):
@@ -114,7 +112,7 @@ def placement(
         raise InputError("the program does not say how its input lies", "export a program that infer has written")
     if on_input is None:
         on_input = not file_format.maker
-    per_cell, name = cell_size(file_format, program, frame, unit, file_unit)
+    per_cell, name = cell_size(file_format, program, unit, file_unit)
     if frame is not None and on_input and not up:
         if not unit and file_format.unit != "text":
             return Placement(frame)
@@ -125,14 +123,12 @@ def placement(
     return Placement(Frame.of(per_cell, centre, matrix), name)
 
 
-def cell_size(
-    file_format: Format, program: Program, frame: Frame | None, unit: str = "", file_unit: str = ""
-) -> tuple[float, str]:
+def cell_size(file_format: Format, program: Program, unit: str = "", file_unit: str = "") -> tuple[float, str]:
     """The size of a cell in a file, and the unit that it is in, empty if it is not known; all is as for
     :func:`placement`."""
     if unit == CELLS:
         return 1.0, ""
-    per_cell, source_unit = _real_size(program, frame, file_unit)
+    frame, (per_cell, source_unit) = program.frame, _real_size(program, file_unit)
     target_unit = unit or file_format.unit
     if target_unit == "text":
         target_unit = source_unit if frame is None or (program.unit and program.unit.name) else "mm"
@@ -145,10 +141,11 @@ def cell_size(
     return per_cell, ""
 
 
-def _real_size(program: Program, frame: Frame | None, file_unit: str) -> tuple[float, str]:
+def _real_size(program: Program, file_unit: str) -> tuple[float, str]:
     """The size of a cell of the object, and its unit, empty if it is not known; ``file_unit`` is that of the input, or
     without a frame that of the program."""
-    unit, scale, stated = program.unit, program.scale, "" if program.unit is None else program.unit.name
+    frame, unit, scale = program.frame, program.unit, program.scale
+    stated = "" if program.unit is None else program.unit.name
     if stated and file_unit:
         message = f"--file-unit {file_unit} has no effect: the program states its unit, {stated}"
         raise InputError(message, f"leave it out, or correct the line '# unit: {stated}'")
@@ -158,7 +155,7 @@ def _real_size(program: Program, frame: Frame | None, file_unit: str) -> tuple[f
     return per_cell, stated or file_unit
 
 
-def asked_unit(program: Program, frame: Frame | None, unit: str | None, file_unit: str, path: Path) -> Unit | None:
+def asked_unit(program: Program, unit: str | None, file_unit: str, path: Path) -> Unit | None:
     """The unit ``unit`` of the object that is written to ``path``, ``None`` for cells; without one that of the program.
 
     ``file_unit`` is as for :func:`placement`; an ``InputError`` if the size of the object is not known.
@@ -168,7 +165,7 @@ def asked_unit(program: Program, frame: Frame | None, unit: str | None, file_uni
     if unit == CELLS:
         return None
     metres(unit)
-    per_cell, source_unit = _real_size(program, frame, file_unit)
+    per_cell, source_unit = _real_size(program, file_unit)
     if not source_unit:
         in_cells = f"statements in cells have no size: infer the object with --unit {unit}"
         raise InputError(f"cannot write {path} in {unit}: {_UNKNOWN}", _CURE if program.unit else in_cells)
@@ -206,12 +203,13 @@ def frame_of_grid(text: Frame, scale: Scale) -> Frame:
     return Frame.of(size, np.asarray(text.centre) - size * (axes @ [0.0, scale.middle, scale.floor]), axes @ _GRID.T)
 
 
-def in_grid_of(program: Program, frame: Frame | None, other: Frame) -> Program:
+def in_grid_of(program: Program, other: Frame) -> Program:
     """The same program in the grid of another frame, such as that of the shape that it was inferred from.
 
     Unchanged if its frame is not known, its parts are not placed, or the frames differ by more than size and moves
     upwards and in depth.
     """
+    frame = program.frame
     if frame is None or program.scale is None or not np.allclose(frame.axes, other.axes, atol=1e-6):
         return program
     up, depth, side = other.to_grid(frame.centre)
@@ -227,12 +225,12 @@ def scale_of(program: Program) -> Scale:
     return program.scale or Scale(1.0, 0.0)
 
 
-def frame_comment(frame: Frame | None, program: Program) -> str:
+def frame_comment(program: Program) -> str:
     """The comment line above the text of a program that stores the map from the grid to the world; empty without it."""
-    if frame is None:
+    if program.frame is None:
         return ""
     scale = scale_of(program)
-    text, unit_name = frame_of_text(frame, scale), "" if program.unit is None else program.unit.name
+    text, unit_name = frame_of_text(program.frame, scale), "" if program.unit is None else program.unit.name
     size = f"{text.scale:.8g}"
     factors = {name: METRES[unit_name] / length for name, length in METRES.items()} if unit_name else {"": 1.0}
     for name, factor in factors.items():

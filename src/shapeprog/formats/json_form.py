@@ -29,7 +29,7 @@ from shapeprog.language.ast import Draw, Part
 from shapeprog.language.evaluate import provenance
 from shapeprog.language.parameters import LARGEST
 from shapeprog.language.printer import printed, source_of
-from shapeprog.language.program import Program, frame_of
+from shapeprog.language.program import Program, program_of
 from shapeprog.language.statement import language
 from shapeprog.language.text import Text
 from shapeprog.space import Frame
@@ -45,8 +45,8 @@ class SavedResult(NamedTuple):
 
     Parameters
     ----------
-    program, frame
-        The program, and the frame of the input if its text has one.
+    program
+        The program, with the frame of the input if its text has one.
     snapped
         Its form in whole cells, if the file has one.
     scores
@@ -56,7 +56,6 @@ class SavedResult(NamedTuple):
     """
 
     program: Program
-    frame: Frame | None = None
     snapped: Program | None = None
     scores: Mapping[str, float] = MappingProxyType({})
     source: str | None = None
@@ -64,14 +63,13 @@ class SavedResult(NamedTuple):
 
 def read_result(path: Path) -> SavedResult:
     """The contents of a JSON file; raises what :func:`program_from_json` does."""
-    return result_from_json(read_text(path), str(path))
+    return _result(read_text(path), str(path))
 
 
-def result_from_json(text: str, name: str) -> SavedResult:
-    """The contents of a JSON text; raises what :func:`program_from_json` does."""
+def _result(text: str, name: str) -> SavedResult:
     content = _document(text, name)
 
-    def parsed(entry: str) -> tuple[Program, Frame | None]:
+    def parsed(entry: str) -> Program:
         if not isinstance(text := content.get(entry), str):
             message = f"{name}: {entry}: {shortened(text)} is not a string"
             raise InputError(message, "write the text of the program, with \\n at the end of each line")
@@ -80,7 +78,7 @@ def result_from_json(text: str, name: str) -> SavedResult:
     scores, source = content.get("scores"), content.get("source")
     named = scores.items() if isinstance(scores, dict) else ()
     return SavedResult(
-        *parsed("text"), parsed("snapped")[0] if "snapped" in content else None,
+        parsed("text"), parsed("snapped") if "snapped" in content else None,
         {word: value for word, value in named if type(value) in (int, float) and abs(value) <= LARGEST},
         source if isinstance(source, str) else None,
     )  # fmt: skip
@@ -103,15 +101,15 @@ def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -
     ShapeProgError
         As for :func:`shapeprog.format_program`.
     """
-    frame, unit = frame_of(program, frame), program.unit
-    text = program_text(program, frame)
+    program = program_of(program, frame)
+    text, unit = program_text(program), program.unit
     content = {"format": FORMAT, "version": VERSION, "text": text, "unit": "cells" if unit is None else unit.name}
-    if frame is not None:
-        placed = frame_of_text(frame, scale_of(program))
+    if program.frame is not None:
+        placed = frame_of_text(program.frame, scale_of(program))
         content["frame"] = {"origin": placed.centre, "scale": placed.scale, "axes": placed.axes}
     lines = [f'  "{key}": {json.dumps(value, allow_nan=False)}' for key, value in {**content, **more}.items()]
     with suppress(ShapeProgError):  # too many or too large for a list
-        if solids := _solids(program, text.startswith("#") and frame is not None):
+        if solids := _solids(program, text.startswith("#") and program.frame is not None):
             lines.append('  "solids": [\n' + ",\n".join(f"    {json.dumps(solid)}" for solid in solids) + "\n  ]")
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
@@ -150,7 +148,7 @@ def program_from_json(text: str, name: str = "<json>") -> Program:
     InputError
         If it is JSON of another kind, naming the entry.
     """
-    return result_from_json(text, name).program
+    return _result(text, name).program
 
 
 def _document(text: str, name: str) -> dict[str, Any]:

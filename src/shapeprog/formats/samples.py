@@ -38,7 +38,7 @@ def occupied(
     return cells.pack(voxelise_mesh(vertices * (resolution / RESOLUTION), faces, resolution))
 
 
-def npy(program: Program, frame: Frame, resolution: int = RESOLUTION) -> bytes:
+def npy(program: Program, resolution: int = RESOLUTION) -> bytes:
     """The cells of a program, as in the evaluation: booleans (R, R, R) in the grid frame."""
     check_number("resolution", resolution, 1, FINEST, whole=True)
     content = io.BytesIO()

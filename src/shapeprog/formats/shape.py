@@ -12,27 +12,20 @@ from shapeprog.formats.frames import frame_comment, frame_of_grid, scale_of, spl
 from shapeprog.language.parser import parse
 from shapeprog.language.printer import format_program
 from shapeprog.language.program import Program
-from shapeprog.space import Frame
 
 LARGEST_FILE = 16_000_000  # bytes of the largest program file
 
 
-def read_shape(path: Path) -> tuple[Program, Frame | None]:
-    """The program of a text file, and its frame if it has one."""
-    return program_in(read_text(path), str(path))
-
-
-def program_in(text: str, name: str) -> tuple[Program, Frame | None]:
-    """The program of a text, and its frame if a comment stores one."""
+def program_in(text: str, name: str) -> Program:
+    """The program of a text, with its frame if a comment stores one."""
     text, frame = split_frame(text, name)
     program = parse(text, name)
-    frame = None if frame is None else frame_of_grid(frame, scale_of(program))
-    return replace(program, frame=frame), frame
+    return program if frame is None else replace(program, frame=frame_of_grid(frame, scale_of(program)))
 
 
-def program_text(program: Program, frame: Frame | None) -> str:
+def program_text(program: Program) -> str:
     """Canonical program text with its frame in a comment above it."""
-    return frame_comment(frame, program) + format_program(program)
+    return frame_comment(program) + format_program(program)
 
 
 def read_text(path: str | os.PathLike[str]) -> str:

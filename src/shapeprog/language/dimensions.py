@@ -33,7 +33,7 @@ from shapeprog.language.expression import Binary, Expression, Name, Negative, Va
 from shapeprog.language.parameters import to_float32
 from shapeprog.language.placement import BOX, SIZES
 from shapeprog.language.printer import source_of
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, program_of
 from shapeprog.language.statement import language
 from shapeprog.language.unit import METRES, Unit
 from shapeprog.space import SPAN
@@ -134,7 +134,8 @@ def in_unit(program: Program, unit: Unit | None, workshop: bool = False, digits:
     if not isinstance(unit, Unit | None):
         cure = f"give sp.Unit({unit!r}, n), n being the length of a cell; sp.infer and sp.export take the name alone"
         raise ShapeProgError(f"{unit!r} is the name of a unit" if unit in METRES else f"{unit!r} is no unit", cure)
-    source, unit = source_of(program), unit or Unit("", 1.0)
+    program, unit = program_of(program), unit or Unit("", 1.0)
+    source = source_of(program)
     if source.unit is None:
         raise ShapeProgError("statements in cells have no unit", "shapeprog tidy places them from sides")
     if source.unit == unit:

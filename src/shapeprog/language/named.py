@@ -17,7 +17,7 @@ from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import names_in, text_of
 from shapeprog.language.parameters import LARGEST, to_float32
 from shapeprog.language.printer import printed
-from shapeprog.language.program import Program, check_program
+from shapeprog.language.program import Program, program_of
 from shapeprog.language.unroll import exact_scene, on_numpy_if_shipped, unroll
 
 FARTHEST = 3.0  # multiple of a number up to which it is tried
@@ -62,7 +62,7 @@ class Named:
 
 def inline(program: Program) -> Program:
     """The program written out: statements and loops in cells with plain numbers."""
-    check_program(program)
+    program = program_of(program)
     return Program(program.body, frame=program.frame)
 
 
@@ -71,7 +71,7 @@ def names(program: Program) -> list[Named]:
 
     Names inside of functions are not among them: their value differs from call to call.
     """
-    check_program(program)
+    program = program_of(program)
     if program.source is None:
         return []
     numbers = program.source.evaluated_numbers()
@@ -97,7 +97,7 @@ def set(program: Program, changes: Mapping[str, float] | None = None, /, **numbe
     ShapeProgError
         If it has no such name, or the program cannot be drawn with such numbers.
     """
-    check_program(program)
+    program = program_of(program)
     replacements = {**(changes or {}), **numbers}
     if not replacements:
         return program

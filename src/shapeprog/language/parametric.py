@@ -19,7 +19,7 @@ from shapeprog.language.evaluate import symbolic
 from shapeprog.language.expression import Linear
 from shapeprog.language.named import names
 from shapeprog.language.parameters import LARGEST, Quantity
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, program_of
 from shapeprog.language.statement import Statement, language
 from shapeprog.language.tensors import Code, encode
 from shapeprog.lazy_torch import Tensor, torch
@@ -53,6 +53,7 @@ class Parametric:
     code: Code
 
     def __init__(self, program: Program) -> None:
+        program = program_of(program)
         free = [named for named in names(program) if named.free and not named.whole]
         self._source = program.source or Source()
         self.names = tuple(named.name for named in free)

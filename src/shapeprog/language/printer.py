@@ -29,7 +29,7 @@ from shapeprog.language.ast import (
 )
 from shapeprog.language.expression import Value, text_of
 from shapeprog.language.placement import ROUND_ROLES
-from shapeprog.language.program import DEEPEST, Draw, Node, Program, check_program
+from shapeprog.language.program import DEEPEST, Draw, Node, Program, program_of
 from shapeprog.language.statement import language
 from shapeprog.language.text import LONGEST
 from shapeprog.language.unit import HEAD
@@ -68,7 +68,7 @@ def printed(source: Source) -> list[tuple[str, Line | None]]:
 
 def source_of(program: Program) -> Source:
     """A program as it is written; one without names as its statements and loops."""
-    check_program(program)
+    program = program_of(program)
     return program.source or Source(program.body)
 
 

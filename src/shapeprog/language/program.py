@@ -6,7 +6,7 @@ import importlib
 import math
 import reprlib
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -109,26 +109,18 @@ class Program:
 
 def programs_of(value: Any) -> list[Program]:
     """One program, or several, as a list; a ``ShapeProgError`` if anything else is among them."""
-    programs: list[Program] = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else [value]
-    for program in programs:
-        check_program(program)
-    return programs
+    return [*map(program_of, value if isinstance(value, Iterable) and not isinstance(value, str) else [value])]
 
 
-def check_program(value: object) -> None:
-    """Raise a ``ShapeProgError`` unless a value is a program."""
-    if not isinstance(value, Program):
-        cure = (
-            "sp.parse reads text, sp.load a file; results of sp.infer hold one as .program, sp.decode returns several"
-        )
+def program_of(value: Any, frame: Frame | None = None) -> Program:
+    """A program, or that of a result, in the frame that a caller gives; a ``ShapeProgError`` if either is none."""
+    program = getattr(value, "program", value)
+    if not isinstance(program, Program):
+        cure = "sp.parse reads text, sp.load a file; sp.decode returns several"
         raise ShapeProgError(f"{reprlib.repr(value)} is no program", cure)
-
-
-def frame_of(program: Program, frame: object) -> Frame | None:
-    """The frame that a caller gives, or else that of the program; a ``ShapeProgError`` if it is none."""
     if not isinstance(frame, Frame | None):
         raise ShapeProgError(f"frame is {reprlib.repr(frame)}", "give the frame of a shape or of a program, or nothing")
-    return frame or program.frame
+    return program if frame is None else replace(program, frame=frame)
 
 
 def nest(chain: Chain) -> Node:

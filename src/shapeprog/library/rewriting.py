@@ -24,7 +24,7 @@ from shapeprog.language.evaluate import evaluated
 from shapeprog.language.expression import Expression, rounded
 from shapeprog.language.merging import merged_lines, separate_loops
 from shapeprog.language.printer import source_of
-from shapeprog.language.program import Program, check_program
+from shapeprog.language.program import Program, program_of
 from shapeprog.library.blocks import ROWS
 from shapeprog.library.length import length, statements, written
 from shapeprog.library.matching import TOLERANCE, Form, Matcher, Pattern, forms
@@ -41,7 +41,7 @@ def with_library(program: Program, library: Library) -> Program:
     are not linear in its names.
     """
     check_library(library)
-    check_program(program)
+    program = program_of(program)
     try:
         original = placed(program)
         cells = named_cells(original)

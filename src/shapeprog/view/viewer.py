@@ -71,14 +71,13 @@ def viewer(
     shape: Shape | None = None,
     title: str = "",
     scores: Mapping[str, float] | None = None,
-    frame: Frame | None = None,
 ) -> Path:
     """Write the page: the program next to its parts, and the input if there is one.
 
     Parameters
     ----------
     program
-        The program to draw.
+        The program to draw; text that is copied from the page keeps its frame.
     path
         The page, which ends in .html.
     shape
@@ -87,8 +86,6 @@ def viewer(
         Stands above the program; by default the name of the input or of the page.
     scores
         Scores by name, as ``picture`` takes them.
-    frame
-        The way to the world of the input, which is kept in the text that is copied from the page.
 
     Raises
     ------
@@ -104,7 +101,7 @@ def viewer(
     given = None if shape is None else _input(shape)
     target = Path(path)
     content = {
-        "frame": frame_comment(frame, program),
+        "frame": frame_comment(program),
         "title": title or (shape.name if shape is not None else target.stem),
         "facts": " · ".join(scores_text(scores, program)),
         "lines": [_line(row) for row in listing(program, None)],
@@ -115,7 +112,7 @@ def viewer(
         ],
         "sliders": [_slider_content(slider) for slider in sliders(program, drawn)],
         "digits": digits_in(program.unit),
-        "scale": cell_size(written_format(Path("a.stl")), program, frame)[0],
+        "scale": cell_size(written_format(Path("a.stl")), program)[0],
         "input": None if given is None else _buffers(*given),
     }
     text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")

@@ -19,7 +19,7 @@ from shapeprog.inference.fit.settings import FIT
 from shapeprog.inference.fit.tunable import Poses, Tunable
 from shapeprog.inference.surface.evidence import Evidence, evidence_of
 from shapeprog.inference.surface.settings import SURFACE
-from shapeprog.language.program import Program, check_program
+from shapeprog.language.program import Program, program_of
 
 
 def refine(program: Program, shape: Shape | str, *, seed: int = 0) -> Program:
@@ -42,8 +42,7 @@ def refine(program: Program, shape: Shape | str, *, seed: int = 0) -> Program:
     ShapeProgError
         If an argument is of the wrong kind.
     """
-    check_program(program)
-    return adjust(program, evidence_of(loaded(shape)), seed=seed)
+    return adjust(program_of(program), evidence_of(loaded(shape)), seed=seed)
 
 
 def adjust(

@@ -107,8 +107,6 @@ def test_export_writes_programs_in_another_unit(run: Run, tmp_path: Path) -> Non
     assert "width, depth, height = 66.667, 66.667, 200\nn = 2\n" in (tmp_path / "cm.shape").read_text()
     assert run("export", "cm.shape", "mm.json", "--unit", "mm", "--set", "width=80").code == 0
     other = load(tmp_path / "mm.json")
-    assert frame is not None
-    assert other.frame is not None
     np.testing.assert_allclose(other.frame.matrix(), frame.matrix(), rtol=1e-7)
     assert [each.value for each in names(other)] == [800, pytest.approx(666.67), 2000, 2, pytest.approx(633.33)]
     assert run("export", "mm.json", "back.shape", "--unit", "cells").code == 0

@@ -112,11 +112,7 @@ def changed(name):
 
 
 def upright(program, name="a.scad", **asked):
-    chosen = format_of(name)
-    assert chosen is not None
-    frame = placement(chosen, program, **asked).frame
-    assert frame is not None
-    return frame
+    return placement(format_of(name), program, **asked).frame
 
 
 @needs_openscad

@@ -109,7 +109,6 @@ def test_a_rounded_program_is_read_back_and_lies_where_it_lay(name: str, tmp_pat
     save(rounded, tmp_path / "leg.shape", frame)
     again = load(tmp_path / "leg.shape")
     assert format_program(again) == format_program(rounded)
-    assert again.frame is not None
     one, two = (f.to_world(part_meshes(unroll(p))[0].vertices) for p, f in ((program, frame), (again, again.frame)))
     assert abs(one - two).max() <= (TOLERANCES[0] + 1e-3) * frame.scale
 
@@ -147,7 +146,6 @@ def test_an_stl_in_millimetres_becomes_a_program_in_millimetres_that_lies_on_it(
     assert all(value == round(value) for value in sizes.values())
     save(program, tmp_path / "table.shape")
     again = load(tmp_path / "table.shape")
-    assert again.frame is not None
     vertices = [again.frame.to_world(part.vertices) for part in part_meshes(unroll(again))]
     corners = shape.frame.to_world(shape.vertices)
     for end in (np.min, np.max):

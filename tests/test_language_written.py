@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -195,16 +193,6 @@ def test_everything_that_works_on_shapes_takes_programs_with_names() -> None:
     assert sp.unroll(program).centre.tolist() == sp.unroll(plain).centre.tolist()
     assert (program.size, program.statements, program.blocks) == (plain.size, plain.statements, plain.blocks)
     assert program.snap() == plain.snap()
-
-
-@pytest.mark.parametrize("suffix", [".shape", ".json"])
-def test_files_keep_programs_as_they_are_written_and_their_frame(tmp_path: Path, suffix: str) -> None:
-    program, frame = parse(CHAIR), sp.Frame(0.25, (1.0, 2.0, 3.0))
-    sp.save(program, tmp_path / f"chair{suffix}", frame)
-    sp.save(sp.load(tmp_path / f"chair{suffix}"), tmp_path / "again.shape")
-    again = sp.load(tmp_path / "again.shape")
-    assert (again, again.frame) == (program, frame)
-    assert (tmp_path / "again.shape").read_text().count("# placed:") == 1
 
 
 def test_a_sum_starts_with_what_is_added() -> None:

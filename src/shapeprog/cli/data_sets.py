@@ -183,8 +183,7 @@ def evaluate_command(
     for path, name, prediction in track(listed, "measuring", console=terminal.errors(), transient=True, disable=hidden):
         target = next(iter(shapes.values())) if len(shapes) == len(listed) == 1 else shapes.get(name)
         program = prediction.program if isinstance(prediction, SavedResult) else None
-        if program is not None and program.source is not None:
-            terminal.warn(path, *program.source.warnings)
+        terminal.warn(path, *(program.source.warnings if program and program.source else ()))
         try:
             if program is not None and target is not None and not (up or front):
                 target = scoring.in_pose_of(program, target, points, seed)

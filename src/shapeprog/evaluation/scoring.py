@@ -74,7 +74,7 @@ def evaluate(
     is_path = isinstance(prediction, str | os.PathLike) and "\n" not in str(prediction)  # else it is a text
     given: Any = _read(Path(prediction)) if is_path else prediction  # type: ignore[arg-type]
     program = program_of(given, frame)
-    frame, result = program.frame, SavedResult(program, getattr(given, "snapped", None))
+    frame = program.frame
     shape = target if isinstance(target, Shape) else load_in_axes(target, frame, points=2 * points, seed=seed)
     shape = in_pose_of(program, shape, points, seed)
     if shape is target and shape.scan is not None:
@@ -84,7 +84,7 @@ def evaluate(
             "the program has other axes than the target",
             "load the target with the axes of the frame: up and front of sp.load_shape; or give its frame",
         )
-    return measure(result, shape, points, seed)
+    return measure(SavedResult(program, getattr(given, "snapped", None)), shape, points, seed)
 
 
 def predictions(path: Path, points: int, seed: int) -> Iterator[tuple[Path, str, Prediction | ShapeProgError]]:

@@ -86,8 +86,7 @@ class Format:
 
     def read(self, text: str, name: str) -> Program:
         """The program in the text of a file, with its frame if it has one; ``name`` stands for the file in errors."""
-        program: Program = _function(self.reader)(text, name)
-        return program
+        return _function(self.reader)(text, name)
 
     def content(self, program: Program, **options: Any) -> Content:
         """What a file with the program holds."""

@@ -144,13 +144,12 @@ def cell_size(file_format: Format, program: Program, unit: str = "", file_unit: 
 def _real_size(program: Program, file_unit: str) -> tuple[float, str]:
     """The size of a cell of the object, and its unit, empty if it is not known; ``file_unit`` is that of the input, or
     without a frame that of the program."""
-    frame, unit, scale = program.frame, program.unit, program.scale
-    stated = "" if program.unit is None else program.unit.name
+    unit, scale, stated = program.unit, program.scale, "" if program.unit is None else program.unit.name
     if stated and file_unit:
         message = f"--file-unit {file_unit} has no effect: the program states its unit, {stated}"
         raise InputError(message, f"leave it out, or correct the line '# unit: {stated}'")
-    if frame is not None and not stated:
-        return frame.scale, file_unit or assumed_unit(SPAN * frame.scale)
+    if program.frame is not None and not stated:
+        return program.frame.scale, file_unit or assumed_unit(SPAN * program.frame.scale)
     per_cell = 1 / scale.cells_per_unit if scale else unit.per_cell if unit else 1.0  # the first is not rounded
     return per_cell, stated or file_unit
 

@@ -109,13 +109,13 @@ def program_to_json(program: Program, frame: Frame | None = None, **more: Any) -
         content["frame"] = {"origin": placed.centre, "scale": placed.scale, "axes": placed.axes}
     lines = [f'  "{key}": {json.dumps(value, allow_nan=False)}' for key, value in {**content, **more}.items()]
     with suppress(ShapeProgError):  # too many or too large for a list
-        if solids := _solids(program, text.startswith("#") and program.frame is not None):
+        if solids := _solids(program):
             lines.append('  "solids": [\n' + ",\n".join(f"    {json.dumps(solid)}" for solid in solids) + "\n  ]")
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
-    """The line, role, kind and bounds of each solid that a program draws; ``framed`` if a comment is above its text."""
+def _solids(program: Program) -> list[dict[str, Any]]:
+    """The line, role, kind and bounds of each solid that a program draws."""
     from shapeprog.geometry.mesh import bounds  # reading a program needs no geometry
     from shapeprog.language.unroll import exact_scene
 
@@ -123,7 +123,7 @@ def _solids(program: Program, framed: bool) -> list[dict[str, Any]]:
         raise ShapeProgError(f"more than {MOST_SOLIDS} solids")
     source, scale = source_of(program), scale_of(program)
     drawn, lines = provenance(source), dict[int, tuple[int, str]]()
-    for row, (_, line) in enumerate(printed(source), 1 + framed):
+    for row, (_, line) in enumerate(printed(source), 1 if program.frame is None else 2):
         if isinstance(line, Draw | Part):
             lines |= dict.fromkeys(drawn[id(line)], (row, line.kind if isinstance(line, Part) else line.name))
     roles = [draw.word if draw.word in language().roles else "" for draw in program.draws]

@@ -62,8 +62,7 @@ class Named:
 
 def inline(program: Program) -> Program:
     """The program written out: statements and loops in cells with plain numbers."""
-    program = program_of(program)
-    return Program(program.body, frame=program.frame)
+    return replace(program_of(program), source=None)
 
 
 def names(program: Program) -> list[Named]:

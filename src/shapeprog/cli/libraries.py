@@ -40,7 +40,7 @@ def learn_command(
     terminal.check_free([out], overwrite)
     terminal.load_modules(modules)
     paths = [path for folder in folders for path in ([folder] if folder.is_file() else program_files(folder))]
-    programs = [terminal.read_program_file(path) for path in paths]
+    programs = [terminal.read_program_file(path)[0] for path in paths]
     library = learn(programs, most)
     if not library.functions:
         message = f"no function shortens {'this program' if len(programs) == 1 else f'these {len(programs)} programs'}"

@@ -280,8 +280,8 @@ def load_libraries(files: Sequence[Path] | None, shipped: bool) -> list[Library]
     return [*map(load_library, libraries), *([load_library()] if shipped else [])]
 
 
-def read_program_file(path: Path, changes: Sequence[str] | None = None) -> Program:
-    """The program of a file, with other numbers for its names as ``--set`` has them; prints its warnings."""
+def read_program_file(path: Path, changes: Sequence[str] | None = None) -> tuple[Program, Frame | None]:
+    """The program of a file and its frame, with other numbers for its names as ``--set`` has them; prints warnings."""
     from shapeprog.cli.changes import changed
     from shapeprog.formats import load
 
@@ -289,7 +289,7 @@ def read_program_file(path: Path, changes: Sequence[str] | None = None) -> Progr
     warn(path, *(program.source.warnings if program.source else ()))
     edited, doubts = changed(program, changes or ())
     warn(path, *doubts)
-    return edited
+    return edited, edited.frame
 
 
 def warn(path: Path, *warnings: str) -> None:

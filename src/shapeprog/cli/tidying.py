@@ -45,7 +45,7 @@ def tidy_command(
 
     terminal.check_units(unit, file_unit, needed=True)
     libraries = terminal.load_libraries(modules, library)
-    given = terminal.read_program_file(program)
+    given, _ = terminal.read_program_file(program)
     terminal.check_free([out] if out else [], overwrite, program)
     if not given.size:
         raise InputError(f"{program} draws nothing", "give a program with at least one drawing statement")

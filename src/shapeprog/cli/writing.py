@@ -72,7 +72,7 @@ def export_command(
         if "=" in path.name and CHANGE.fullmatch(str(path)) and format_of(path) is None:
             raise OutputError(f"{path} is no file to write", f"changes of numbers follow --set: --set {path}")
     formats = [written_format(path) for path in outputs]
-    loaded = terminal.read_program_file(program, changes)
+    loaded, _ = terminal.read_program_file(program, changes)
     terminal.check_free(outputs, overwrite, program)
     makers = any(file_format.maker for file_format in formats)
     has_unit = file_unit is not None or (loaded.unit is not None and loaded.unit.name)
@@ -142,7 +142,7 @@ def _draw(
     from shapeprog.view import picture, viewer
 
     terminal.load_modules(modules)
-    loaded = terminal.read_program_file(program, changes)
+    loaded, _ = terminal.read_program_file(program, changes)
     if not loaded.size and not loaded.body and loaded.scale is None:
         raise InputError(f"{program} is empty", f"{BEGIN} and a part below it, such as box(height=2)")
     if not loaded.size:
@@ -187,7 +187,7 @@ def sheet_command(
     failures: list[ShapeProgError] = []
     for path in program_files(folder)[:most]:
         try:
-            loaded = terminal.read_program_file(path)
+            loaded, _ = terminal.read_program_file(path)
         except ShapeProgError as error:
             failures.append(error)
             continue

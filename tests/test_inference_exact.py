@@ -13,6 +13,8 @@ from shapeprog.data.shape import Shape
 from shapeprog.formats.parts import parts
 from shapeprog.geometry.mesh import part_meshes
 from shapeprog.inference.fit.snapping import snapped
+from shapeprog.inference.pieces.patches import planar_patches
+from shapeprog.inference.surface.cloud import cloud_of
 from shapeprog.inference.surface.evidence import evidence_of, evidence_of_program, off_parts
 from shapeprog.inference.surface.oriented import boxes_around, primitive_boxes
 from shapeprog.inference.ties.tying import tie
@@ -53,20 +55,34 @@ def values(program: Program) -> list[list[float]]:
     return [list(node.values) for node in program.walk()]
 
 
-def test_a_case_in_one_closed_surface_with_its_overhanging_top_is_two_parts():
-    profile = np.array([(0, 0), (0, 600), (900, 600), (900, -60), (870, -60), (870, 0)], float)  # height and depth
-    vertices = np.concatenate([np.insert(profile, 2, side, axis=1) for side in (0, 620)])
-    cap, edge = np.array([(0, 1, 5), (1, 4, 5), (1, 2, 4), (2, 3, 4)]), np.arange(6)
+def prism(profile: list[tuple[float, float]], caps: list[tuple[int, int, int]], axis: int, length: float) -> Shape:
+    """A closed surface between two copies of a profile in the other two axes, which triangles of its corners fill."""
+    count = len(profile)
+    edge = np.arange(count)
     following = np.roll(edge, -1)
-    walls = np.stack([edge, following + 6, following, edge, edge + 6, following + 6], 1).reshape(-1, 3)
-    shape = shape_from_mesh(vertices, np.concatenate([cap, cap[:, ::-1] + 6, walls]), axes=np.eye(3))
-    text = sp.format_program(sp.infer(shape, unit="mm").program)
-    assert text.splitlines()[1:] == [
+    vertices = np.concatenate([np.insert(np.array(profile), axis, end, axis=1) for end in (0, length)])
+    walls = np.stack([edge, following + count, following, edge, edge + count, following + count], 1).reshape(-1, 3)
+    cap = np.array(caps)
+    return shape_from_mesh(vertices, np.concatenate([cap, cap[:, ::-1] + count, walls]), axes=np.eye(3))
+
+
+def test_a_case_in_one_closed_surface_with_its_overhanging_top_is_two_parts():
+    profile = [(0.0, 0.0), (0.0, 600.0), (900.0, 600.0), (900.0, -60.0), (870.0, -60.0), (870.0, 0.0)]
+    shape = prism(profile, [(0, 1, 5), (1, 4, 5), (1, 2, 4), (2, 3, 4)], axis=2, length=620)
+    assert sp.format_program(sp.infer(shape, unit="mm").program).splitlines()[1:] == [
         "width, depth, height = 620, 660, 900",
         "top_thickness = 30",
         "top(top=0, height=top_thickness)",
         "body(front=60, top=top_thickness)",
     ]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_patch_with_an_inner_corner_consists_of_two_bars_whatever_the_samples(seed):
+    flat = np.random.default_rng(seed).uniform(-12, 12, (6000, 2))
+    flat = flat[(flat < -2).any(1)]
+    bars = planar_patches(cloud_of(np.insert(flat, 0, 0.0, axis=1), np.tile([1.0, 0.0, 0.0], (len(flat), 1))))
+    assert (np.abs(np.sort(bars.half, 1) - [0, 5, 12]).max(1) < 0.6).sum() == 2
 
 
 def test_boards_of_two_thicknesses_keep_them_and_the_whole_its_size():

@@ -72,7 +72,7 @@ def infer_command(
     from shapeprog.data import load_all
     from shapeprog.files import make_folder
     from shapeprog.inference import Settings, infer
-    from shapeprog.inference.infer import SURFACE_KERNELS
+    from shapeprog.inference.infer import SURFACE_PATHS
     from shapeprog.kernels.compile import modules_of, prepare
     from shapeprog.view import picture
 
@@ -82,7 +82,7 @@ def infer_command(
         raise InputError(f"--unit {unit} has no effect on --paper", "its statements are in cells; leave one out")
     report = None if as_json else lambda sentence: terminal.note(f"{sentence.capitalize()}.")
     others = ["geometry/voxelise", "evaluation/", *([] if no_picture else ["view/"])]
-    prepare(modules_of(*SURFACE_KERNELS, *others), report)
+    prepare(modules_of(*SURFACE_PATHS, *others), report)
     inference = partial(
         infer, blocks=blocks, budget=budget, seed=seed, settings=None if rounds is None else Settings(rounds=rounds),
         statements="paper" if paper else "all", detail=detail, ties=not no_ties,

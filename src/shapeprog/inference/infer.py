@@ -46,14 +46,12 @@ from shapeprog.library import Library, joined, with_library
 
 SEARCH_SHARE = 0.65  # share of the time budget after which the search on cells hands over to fitting
 
-SURFACE_KERNELS = (
-    "geometry/distance", "geometry/surface", "inference/choice/", "inference/pieces/", "inference/surface/",
-)  # fmt: skip
-CELL_KERNELS = "geometry/cell", "inference/cells/"
+SURFACE_PATHS = "geometry/distance", "geometry/surface", "inference/choice/", "inference/pieces/", "inference/surface/"
+CELL_PATHS = "geometry/cell", "inference/cells/"
 """Where the kernels of the search on the surface and of that on cells are; those with the same helpers together."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Result:
     """The result of inference.
 
@@ -79,13 +77,9 @@ class Result:
     program: Program
     snapped: Program | None
     scores: dict[str, float]
-    reason: str
+    reason: str = field(repr=False)
     cut: tuple[str, ...]
     seconds: float = field(compare=False)
-
-    def __repr__(self) -> str:
-        """The first line of its report."""
-        return f"<Result: {str(self).splitlines()[0]}>"
 
     def __str__(self) -> str:
         """A short report: the size of the program, how well it fits, and why the search stopped."""
@@ -232,4 +226,4 @@ def prepare_kernels(*, cells: bool = False) -> None:
     It does not count against the time budget, except for kernels of cells where a surface gave no program.  The first
     call on a machine takes seconds, the first in a process a fraction of one.
     """
-    prepare(modules_of(*SURFACE_KERNELS, *(CELL_KERNELS if cells else ())))
+    prepare(modules_of(*SURFACE_PATHS, *(CELL_PATHS if cells else ())))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.ndimage import find_objects
+from scipy.ndimage import convolve, find_objects
 from scipy.ndimage import label as label_regions
 
 from shapeprog.inference.pieces.groups import distinct
@@ -35,7 +35,7 @@ def planar_patches(cloud: Cloud) -> Boxes:
         return join([])
     boxes = boxes_around(sets, upright(principal_axes(sets)[1][:, :, 2]), 2 * cloud.spacing)
     patches = boxes._replace(half=(boxes.half + cloud.spacing / 4) * [1, 1, 0])
-    return join([patches, *_bars(sets, patches, 1.8 * cloud.spacing)])
+    return join([patches, *_bars(sets, patches, 2.2 * cloud.spacing)])
 
 
 def upright(normal: FloatArray) -> FloatArray:
@@ -57,6 +57,7 @@ def _bars(sets: list[FloatArray], patches: Boxes, side: float) -> Iterator[Boxes
         grid = np.zeros(shape, np.bool_)
         at = ((points - middle) @ axes[:, :2] + half[:2]) / extent * shape
         grid[tuple(np.minimum(at.astype(int), shape - 1).T)] = True
+        grid |= convolve(grid.astype(int), np.ones((3, 3), int), mode="constant", cval=1) >= 7  # holes between samples
         if grid.mean() > SETTINGS.full or shape.max() < 6:
             continue
         ends = np.reshape(_bars_of(grid), (-1, 2, 2)) / shape * extent - half[:2]

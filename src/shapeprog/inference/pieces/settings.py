@@ -35,7 +35,7 @@ class Settings:
     # Patches, and the bars that they consist of
     patches: int = 160
     patch_points: int = 16  # points of the smallest
-    full: float = 0.8  # share of a rectangle that its patch fills, below which its bars are detected as well
+    full: float = 0.9  # share of a rectangle that its patch fills, below which its bars are detected as well
     bar_full: float = 0.7  # share of its rectangle that a bar fills
     bar_runs: tuple[float, ...] = (0.6, 0.25, 0.1)  # lengths of bars, as shares of the rectangle that they lie in
 

@@ -143,7 +143,7 @@ def test_a_result_stands_for_its_program(tmp_path: Path) -> None:
         lambda given: sp.export(given, tmp_path / "a.obj").read_text(),
         lambda given: sp.in_unit(given, sp.Unit("mm", 30)), lambda given: sp.set(given, seat_bottom=40),
         lambda given: sp.with_library(given, sp.load_library()), lambda given: [name.value for name in sp.names(given)],
-        lambda given: sp.unroll([given]).centre.tolist(), lambda given: sp.Parametric(given).values.tolist(),
+        lambda given: sp.unroll(given).centre.tolist(), lambda given: sp.Parametric(given).values.tolist(),
     ]  # fmt: skip
     for function in functions:
         assert function(result) == function(given)
@@ -215,3 +215,9 @@ def test_zero_is_a_length() -> None:
     )
     cone = sp.Parametric(parse(text))
     assert sp.unroll(cone.at(cone.values)).mask.sum() == 3
+
+
+def test_frames_of_arrays_and_of_tuples_are_equal() -> None:
+    frame = sp.Frame(2.0, np.zeros(3), np.eye(3))  # type: ignore[arg-type]
+    assert frame == sp.Frame(2.0)
+    assert hash(frame) == hash(sp.Frame(2.0))

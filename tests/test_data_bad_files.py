@@ -100,7 +100,7 @@ def test_a_shape_that_cannot_be_made_does_not_stop_the_others_of_its_file(tmp_pa
     voxels = np.stack([packed, np.zeros_like(packed), packed, packed])
     sides = np.array([1, 1, 5e-324, 1])
     path = written(tmp_path / "a.npz", npz(ids=np.array(list("abcd")), voxels=voxels, longest_side=sides))
-    found = [shape for _, shape in load_all([path])]
+    found = [shape for _, shape in load_all(path)]
     assert [type(each) for each in found] == [Shape, InputError, InputError, Shape]
     assert "b has no occupied cell" in str(found[1])
     assert "longest side of c" in str(found[2])

@@ -118,5 +118,6 @@ def test_refinement_writes_names_out():
     shape = Shape("planted", cells(named), points(named).numpy())
     fitted = refine(named, shape)
     assert fitted.source is None
+    assert fitted.frame == shape.frame
     assert fitted == refine(inlined, shape)
     assert [node.role for node in fitted.walk()] == ["body", "top"]

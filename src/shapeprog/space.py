@@ -89,6 +89,8 @@ class Frame:
         centre, axes = np.asarray(self.centre), np.asarray(self.axes)
         if centre.shape != (3,) or not np.isfinite(centre).all() or not is_rotation(axes):
             raise ShapeProgError(f"{self} is no frame", "its centre must be finite and its axes a rotation")
+        object.__setattr__(self, "centre", tuple(map(float, centre)))
+        object.__setattr__(self, "axes", tuple(tuple(map(float, row)) for row in axes))
 
     @staticmethod
     def around(low: npt.ArrayLike, high: npt.ArrayLike, axes: npt.ArrayLike | None = None) -> Frame:
@@ -101,8 +103,7 @@ class Frame:
     @staticmethod
     def of(scale: float, centre: npt.ArrayLike, axes: npt.ArrayLike) -> Frame:
         """The frame of a scale, a centre (3,) and axes (3, 3)."""
-        x, y, z = np.asarray(centre, np.float64).tolist()
-        return Frame(float(scale), (x, y, z), tuple((a, b, c) for a, b, c in np.asarray(axes, np.float64).tolist()))
+        return Frame(float(scale), centre, axes)  # type: ignore[arg-type]  # arrays become tuples
 
     def to_world(self, points: npt.ArrayLike) -> FloatArray:
         """World positions (..., 3) of grid positions (..., 3)."""

@@ -108,7 +108,7 @@ def path_of(shape: Shape) -> str | None:
 
 
 def load_all(
-    paths: Iterable[str | os.PathLike[str]],
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     *,
     up: str | None = None,
     front: str | None = None,
@@ -127,7 +127,7 @@ def load_all(
     up, front, points, seed
         As for :func:`load`.
     """
-    for path in paths:
+    for path in [paths] if isinstance(paths, str | os.PathLike) else paths:
         try:
             file, index = _split_index(path)
             files, skipped = _files_in(file) if os.path.isdir(file) else ([file], [])

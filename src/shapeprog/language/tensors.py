@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,7 +75,7 @@ def encode(
                     roles[b, k] = registry.roles[node.role].id
     played = torch.from_numpy(roles) if roles.any() else None
     code = Code(torch.from_numpy(ids), torch.from_numpy(parameters).to(dtype or torch.float32), played)
-    return code[0] if isinstance(programs, Program) else code
+    return code if isinstance(programs, Iterable) else code[0]
 
 
 def decode(code: Code) -> list[Program]:

@@ -42,7 +42,7 @@ def refine(program: Program, shape: Shape | str, *, seed: int = 0) -> Program:
     ShapeProgError
         If an argument is of the wrong kind.
     """
-    return adjust(program_of(program), evidence_of(loaded(shape)), seed=seed)
+    return adjust(program_of(program, (target := loaded(shape)).frame), evidence_of(target), seed=seed)
 
 
 def adjust(

@@ -91,7 +91,7 @@ class Tunable:
             moving = {*_moving(node)}
             return replace(node, values=tuple(next(new) if k in moving else v for k, v in enumerate(node.values)))
 
-        return Program(changed_lines(self.program.body, changed))
+        return Program(changed_lines(self.program.body, changed), frame=self.program.frame)
 
     def rounded(self, values: Float[Tensor, " F"]) -> Float[Tensor, " F"]:
         """The numbers with as many decimals as their kind keeps."""

@@ -309,6 +309,9 @@ def test_what_is_saved_and_loaded_lies_at_the_same_place_in_the_world(
     assert program_text(read).splitlines()[1:] == text.splitlines()[1:]
     for one, two in zip(parts(program), parts(in_grid_of(read, frame)), strict=True):
         np.testing.assert_allclose(two.vertices, one.vertices, rtol=0, atol=24e-6)
+    beside = replace(frame, scale=2 * scale, centre=tuple(frame.to_world([1, 2, 3])))  # in size, height, depth and side
+    for one, two in zip(parts(program), parts(in_grid_of(read, beside)), strict=True):
+        np.testing.assert_allclose(beside.to_world(two.vertices), frame.to_world(one.vertices), atol=24e-6 * scale)
 
 
 @pytest.mark.parametrize("unit", ["", "# unit: m\n"])

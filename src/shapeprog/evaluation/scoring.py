@@ -56,8 +56,7 @@ def evaluate(
         points are measured: of a file as by the command, of a loaded shape from the up to 20,000 that it keeps.
     frame
         Where the program lies; by default its own frame, which programs of inference and of files have.  Without any,
-        or if its statements are in cells, it is in the grid of the target, as with ``target.frame``; and so is a
-        program that lies to the left or right of the target.
+        or if its statements are in cells, it is in the grid of the target, as with ``target.frame``.
     points
         Points on each surface for CD and F1 at one cell.
     seed

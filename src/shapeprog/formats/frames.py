@@ -180,7 +180,7 @@ def _ground(program: Program, rests: bool) -> FloatArray:
     from shapeprog.language.convert import placed_if_possible
 
     scale = placed_if_possible(program).scale
-    floor = np.zeros(3) if scale is None else np.array([scale.floor, scale.middle, 0.0])
+    floor = np.zeros(3) if scale is None else np.array([scale.floor, scale.middle, scale.side])
     vertices = [part.vertices for part in parts(program)] if rests or scale is None else []
     if not vertices:
         return floor
@@ -192,31 +192,29 @@ def _ground(program: Program, rests: bool) -> FloatArray:
 def frame_of_text(frame: Frame, scale: Scale) -> Frame:
     """The map from x, y, z of a text to the world, given that from the grid."""
     axes = np.asarray(frame.axes) @ _GRID
-    origin = np.asarray(frame.centre) + frame.scale * (axes @ [0.0, scale.middle, scale.floor])
+    origin = np.asarray(frame.centre) + frame.scale * (axes @ scale.origin)
     return Frame.of(frame.scale * scale.cells_per_unit, origin, axes)
 
 
 def frame_of_grid(text: Frame, scale: Scale) -> Frame:
     """The map from the grid to the world, given that from x, y, z of a text."""
     size, axes = text.scale / scale.cells_per_unit, np.asarray(text.axes)
-    return Frame.of(size, np.asarray(text.centre) - size * (axes @ [0.0, scale.middle, scale.floor]), axes @ _GRID.T)
+    return Frame.of(size, np.asarray(text.centre) - size * (axes @ scale.origin), axes @ _GRID.T)
 
 
 def in_grid_of(program: Program, other: Frame) -> Program:
     """The same program in the grid of another frame, such as that of the shape that it was inferred from.
 
-    Unchanged if its frame is not known, its parts are not placed, or the frames differ by more than size and moves
-    upwards and in depth.
+    Unchanged if its frame is not known, its parts are not placed, or the frames have other axes.
     """
     frame = program.frame
     if frame is None or program.scale is None or not np.allclose(frame.axes, other.axes, atol=1e-6):
         return program
-    up, depth, side = other.to_grid(frame.centre)
     size = frame.scale / other.scale
-    if abs(side) > 1e-3 or not math.isfinite(size):
+    if not math.isfinite(size):
         return program
-    scale, floor, middle = (size * value for value in astuple(program.scale))
-    return evaluated(replace(source_of(program), scale=Scale(scale, floor + up, middle + depth)))
+    scale, *origin = (size * value for value in astuple(program.scale))
+    return evaluated(replace(source_of(program), scale=Scale(scale, *(origin + other.to_grid(frame.centre)))))
 
 
 def scale_of(program: Program) -> Scale:

@@ -131,7 +131,7 @@ def _solids(program: Program) -> list[dict[str, Any]]:
     with exact_scene(program) as scene:
         blocks = scene.block.tolist()
         for slot, (bottom, front, right), (top, rear, left) in bounds(scene):  # the third axis points to the left
-            corners = np.array([(-left, front, bottom), (-right, rear, top)]) - [0.0, scale.middle, scale.floor]
+            corners = np.array([(-left, front, bottom), (-right, rear, top)]) - scale.origin
             low, high = ([float(f"{value + 0.0:.6g}") for value in corner] for corner in corners / scale.cells_per_unit)
             row, kind = lines[blocks[slot]]
             solids.append({"line": row, "role": roles[blocks[slot]], "kind": kind, "low": low, "high": high})

@@ -145,6 +145,12 @@ class Scale:
     cells_per_unit: float  # cells per unit of length; as read, the longest side of the whole is 24 cells
     floor: float  # height of the floor in the grid, in cells
     middle: float = 0.0  # depth of the middle of the whole in the grid, in cells
+    side: float = 0.0  # how far the middle of the whole is to the left of that of the grid, in cells
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """The origin of the text, in cells to the right, to the rear and upwards from that of the grid."""
+        return -self.side, self.middle, self.floor
 
 
 @dataclass(frozen=True)

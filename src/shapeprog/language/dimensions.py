@@ -23,7 +23,6 @@ from shapeprog.language.ast import (
     Loop,
     Part,
     Point,
-    Scale,
     Source,
     body_of,
     with_values,
@@ -192,7 +191,7 @@ def _scaled(source: Source, before: Source) -> Program:
     cells = 1 / source.unit.per_cell
     middle = before.scale.floor + before.evaluated_numbers()["height"] * before.scale.cells_per_unit / 2
     floor = middle - source.evaluated_numbers()["height"] * cells / 2
-    return evaluated(replace(source, scale=Scale(cells, floor, before.scale.middle)))
+    return evaluated(replace(source, scale=replace(before.scale, cells_per_unit=cells, floor=floor)))
 
 
 def lengths(program: Program) -> frozenset[str]:

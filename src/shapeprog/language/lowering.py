@@ -95,6 +95,7 @@ class Lowering(ABC):
         self.decisions: list[int] = []
         self.floor: Any = source.scale.floor if source.scale else 0.0
         self.middle: float = source.scale.middle if source.scale else 0.0
+        self.side: float = source.scale.side if source.scale else 0.0
         self.drawn = self.bodies = 0
 
     @abstractmethod
@@ -363,7 +364,7 @@ class Lowering(ABC):
         scale = self.source.scale
         assert scale is not None
         x, y, z = (value * scale.cells_per_unit for value in point)
-        return z + self.floor, y + self.middle, -x
+        return z + self.floor, y + self.middle, self.side - x
 
     def _length(self, value: Any) -> Any:
         assert self.source.scale is not None

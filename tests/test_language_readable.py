@@ -77,6 +77,15 @@ def test_nearly_upright_bars_move_no_face_far(seed: int) -> None:
     assert "base(height=3.78)" in format_program(moved) or "base(height=3.8)" in format_program(moved)
 
 
+def test_round_legs_that_lean_as_much_sideways_as_backwards_are_rounded() -> None:
+    leg = "rod(start=at(left=margin, rear=margin), end=at(left=inset, rear=inset, bottom=2.719), radius=.277)"
+    names = "width, depth, height = 23.996, 6.833, 7.85\nmargin, inset = .383, .966\n"
+    program = parse(f"{names}for _ in mirror(x=0, y=0):\n    leg({leg})\ntop(bottom=2.719)")
+    text = format_program(in_readable_unit(program, Unit("m", 0.041667)))
+    assert "width, depth, height = 1, 0.285, 0.327\n" in text
+    assert "margin, inset = 0.016, 0.04\n" in text
+
+
 def test_a_part_that_is_thinner_than_the_tolerance_keeps_a_size_and_others_are_rounded() -> None:
     # 12.4826 and 62.486 cm of 75: both would be rounded so that nothing is left between them.
     program = parse("width, depth, height = 20, 16, 24\nside(left=3.3287, right=16.6629)\nbase(height=1.2301)")

@@ -121,14 +121,16 @@ def rounded_box(at: Vector, size: Vector, edge: Scalar) -> Solids:
 def align(direction: Vector) -> Float[Tensor, "*batch 3 3"]:
     """A rotation whose first column points along ``direction``; up for a zero vector.
 
-    The other two columns come from the grid axis that is farthest from the direction, so the gradient is finite; near
-    an axis of the grid it is the same one, so differences are those of one frame.
+    The other two columns come from the grid axis that is about farthest from the direction, so the gradient is finite.
+    Near an axis of the grid, and for legs that lean as much sideways as backwards, it is the same one, so differences
+    are those of one frame.
     """
     length = safe_norm((direction**2).sum(-1, keepdim=True))
     up = torch.zeros_like(direction)
     up[..., 0] = 1
     first = torch.where(length > 1e-9, direction / length, up)
-    helper = unit(first.detach().abs().clamp(min=1e-3).argmin(-1), direction)
+    away = first.detach().abs().clamp(min=1e-3) * torch.tensor([1.0, 1.1, 1.2]).to(first)
+    helper = unit(away.argmin(-1), direction)
     second = torch.linalg.cross(first, helper)
     second = second / safe_norm((second**2).sum(-1, keepdim=True))
     return torch.stack([first, second, torch.linalg.cross(first, second)], -1)

@@ -25,7 +25,7 @@ from shapeprog.inference.surface.evidence import evidence_of_program
 from shapeprog.inference.ties import tying
 from shapeprog.inference.ties.anchors import anchors_of
 from shapeprog.inference.ties.elements import Slot
-from shapeprog.inference.ties.expressions import DISTANCES, _carriable, carried, solved
+from shapeprog.inference.ties.expressions import carried, solved
 from shapeprog.inference.ties.groups import grouped, simplified
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.misfit import Misfit
@@ -649,15 +649,15 @@ def test_parts_move_with_a_shared_number_of_those_that_they_touch():
         assert pieces(*union_mesh(unroll(sp.set(sp.parse(text), seat_drop=10 * factor)))) == 1
 
 
-def test_distances_are_measured_from_another_number_and_sizes_are_not():
-    source = placed(sp.parse(TABLE)).source
-    assert source is not None
-    layout = Layout(source)
-    count = len(layout.slots)
-    front = layout.index[layout.parts[1], "front"]
-    carriable = _carriable(np.eye(count), [*range(count)], layout, front)
-    assert carriable
-    assert {layout.slots[k].kind for k in carriable} <= {*DISTANCES}
+def test_a_shared_number_is_measured_from_that_of_the_parts_that_it_joins():
+    text = tied_text("width, depth, height = 12, 8, 24\nseat(top=10, height=1)\n"
+                     "for _ in mirror(x=0):\n    leg(left=0, width=1, depth=1, top=10)\n"
+                     "panel(rear=2, depth=1, width=2, top=6, height=4.5)\n"
+                     "shelf(rear=3, depth=2, width=4, top=6, height=0.7)\n")  # fmt: skip
+    assert "panel_drop, shelf_setback = seat_drop - 4" in text
+    assert text.count("top=panel_drop") == 2
+    for factor in (0.7, 1.4):
+        assert pieces(*union_mesh(unroll(sp.set(sp.parse(text), seat_drop=10 * factor)))) == 1
 
 
 def test_a_distance_that_rounds_to_zero_is_no_number(monkeypatch: pytest.MonkeyPatch):

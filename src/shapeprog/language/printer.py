@@ -27,7 +27,7 @@ from shapeprog.language.ast import (
     Source,
     note_of,
 )
-from shapeprog.language.expression import Value, text_of
+from shapeprog.language.expression import Value, names_in, text_of
 from shapeprog.language.placement import ROUND_ROLES
 from shapeprog.language.program import DEEPEST, Draw, Node, Program, program_of
 from shapeprog.language.statement import language
@@ -173,10 +173,11 @@ def _remark(text: str) -> str:
 
 
 def assigned(pairs: Iterable[tuple[str, Value]]) -> list[Assignment]:
-    """Names and their values on as many lines as it takes."""
+    """Names and their values on as many lines as it takes; the names of one line are not known there yet."""
     lines: list[list[tuple[str, Value]]] = [[]]
     for pair in pairs:
-        if sum(len(f"{name}{value}") + 4 for name, value in [*lines[-1], pair]) > 118:
+        long = sum(len(f"{name}{value}") + 4 for name, value in [*lines[-1], pair]) > 118
+        if long or not dict(lines[-1]).keys().isdisjoint(names_in(pair[1])):
             lines.append([])
         lines[-1].append(pair)
     return [Assignment(tuple(line)) for line in lines if line]

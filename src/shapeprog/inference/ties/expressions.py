@@ -4,8 +4,7 @@ The numbers that follow from others are chosen greedily.  Which stay free is imp
 method, until no exchange of a free number for another makes the text shorter.
 
 To measure one free number from another leaves the shape as it is, and changes what follows from the other: with
-``apron_drop = seat_drop + 0.96`` the apron goes where the seat goes.  These are elementary column operations, as in the
-reduction of a lattice basis.
+``apron_drop = seat_drop + 0.96`` the apron goes where the seat goes.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ ELIMINATED = {
 }  # fmt: skip
 """Which kinds of numbers rather follow from others: those of the lowest rank first."""
 
-DISTANCES = "clearance", "offset"  # kinds of numbers that are dropped near zero, and that may be measured from another
+DISTANCES = "clearance", "offset"  # kinds of numbers that may be measured from another
 NOTHING = 1e-7  # factors up to this are zero
 
 
@@ -37,6 +36,11 @@ class Solution(NamedTuple):
 
     factors: FloatArray  # of every number by how much it follows from each free one (P, Z)
     free: list[int]  # which numbers are free (Z,)
+    measured: FloatArray  # by how much each free number is measured from another one (Z, Z)
+
+    def chained(self) -> FloatArray:
+        """How each free number follows from the distances from those that they are measured from (Z, Z)."""
+        return np.linalg.inv(np.eye(len(self.free)) - self.measured).astype(np.float64)
 
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:
@@ -69,7 +73,7 @@ def _shortened(slots: list[Slot], factors: FloatArray, free: list[int]) -> Solut
             if slots[free[z]].kind != "extent" and (cost := _cost(new, sizes)) < best - NOTHING:
                 best, exchange = cost, (new, p, z)
         if exchange is None:
-            return Solution(factors, free)
+            return Solution(factors, free, np.zeros((len(free), len(free))))
         factors, p, z = exchange
         free = [*free[:z], p, *free[z + 1 :]]
 
@@ -85,30 +89,26 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
 
 
 def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[Solution, FloatArray]:
-    """The numbers (P,) of a program as expressions of other free ones, so that fewer parts are separated when a shared
-    one changes: at most one is measured from each; and the values of these (Z,)."""
-    free, pairs = solution.free, np.stack(touching(boxes_of(layout.scene(numbers)), TIES.touch), 1)
-    factors, values, unchanged = solution.factors.copy(), numbers[free], np.zeros((1, len(numbers)))
-    together = _pieces(layout, numbers, pairs, unchanged)
-    for z in np.flatnonzero(np.count_nonzero(factors, axis=0) > 1).tolist():
-        fixed = layout.slots[free[z]].kind in ("extent", "angle")
-        if fixed or _pieces(layout, numbers, pairs, factors.T[[z]] * values[z]) == together:
-            continue
-        ways = [(z, 0.0), *product(_carriable(factors, free, layout, z), (1.0, -1.0))]
-        columns = np.array([factors[:, z] + way * factors[:, y] for y, way in ways])
-        y, way = ways[np.argmin(_pieces(layout, numbers, pairs, columns * values[z]))]
-        factors[:, z] += way * factors[:, y]
-        values[y] -= way * values[z]
-    return Solution(factors, free), values
-
-
-def _carriable(factors: FloatArray, free: list[int], layout: Layout, z: int) -> list[int]:
-    """Free distances along an axis along which another free number moves parts, from which nothing follows but equal
-    ones."""
-    slots, unit = layout.slots, np.eye(len(free))
-    axes = {slots[p].axis for p in np.flatnonzero(factors[:, z])}
-    distances = [y for y, k in enumerate(free) if slots[k].kind in DISTANCES and slots[k].axis in axes and y != z]
-    return [y for y in distances if (factors[factors[:, y] != 0] == unit[y]).all()]
+    """The same with free numbers measured from others, so that fewer parts are separated when a shared one changes; and
+    the free numbers (Z,), without what they are measured from, given all (P,)."""
+    factors, free, measured = solution
+    pairs = np.stack(touching(boxes_of(layout.scene(numbers)), TIES.zero), 1)
+    together = _pieces(layout, numbers, pairs, np.zeros((1, len(numbers))))
+    slots = [layout.slots[k] for k in free]
+    for z in sorted(np.flatnonzero(np.count_nonzero(factors, axis=0) > 1).tolist(), key=lambda z: free[z]):
+        way = int(slots[z].kind not in ("extent", "angle") and not measured[z].any())
+        while way:
+            chained = solution.chained()
+            parts, value = (factors @ chained).T, numbers[free[z]]
+            if _pieces(layout, numbers, pairs, parts[[z]] * value) == together:
+                break
+            axes = {layout.slots[p].axis for p in np.flatnonzero(parts[z])}  # -1 for radii
+            near = [y for y, slot in enumerate(slots) if slot.kind in DISTANCES and {slot.axis, -1} & axes]
+            ways = [(z, 0), *product([y for y in near if not chained[z, y]], (1, -1))]
+            changed = np.array([parts[z] + way * parts[y] for y, way in ways])
+            y, way = ways[np.argmin(_pieces(layout, numbers, pairs, changed * value))]
+            measured[y, z] += way
+    return solution, numbers[free] - measured @ numbers[free]
 
 
 def _pieces(layout: Layout, numbers: FloatArray, pairs: Array, parts: FloatArray) -> list[int]:
@@ -118,7 +118,7 @@ def _pieces(layout: Layout, numbers: FloatArray, pairs: Array, parts: FloatArray
     # One batch of all might have more primitives than ``unroll`` takes.
     batches = layout.values(changed.reshape(-1, len(numbers))).split(TIES.changed)
     boxes = [boxes_of(layout.tunable.scenes(batch)) for batch in batches]
-    scene, pair = np.nonzero(np.concatenate([gaps(each, *pairs.T) for each in boxes]) < TIES.touch)
+    scene, pair = np.nonzero(np.concatenate([gaps(each, *pairs.T) for each in boxes]) < TIES.zero)
     count, scenes = boxes[0].centre.shape[1], changed.size // len(numbers)
     labels = linked(count * scene[:, None] + pairs[pair], count * scenes).reshape(len(parts), -1)
     pieces: list[int] = (np.ptp(labels, axis=1) + 1).tolist()  # those of one scene are numbered after those of another

@@ -60,7 +60,8 @@ def grouped(lines: Sequence[Line], numbers: dict[str, float]) -> tuple[Line, ...
             members = [line for line, new in inner.items() if _same(line, Group("inside", frame, (new,)), numbers)]
             box = Group("inside", frame, tuple(inner[line] for line in members))
             instead = tuple(box if line in members[:1] else line for line in lines if line not in members[1:])
-            options.append((sum(map(_words, members)) - _words(box) - 2, instead))
+            after, *before = (sum(cost(tuple(_keywords(line)))) for line in (box, *members))  # words and operators
+            options.append((sum(before) - after - 2, instead))
         saved, lines = max(options, key=lambda option: option[0])
     return lines
 
@@ -81,11 +82,6 @@ def _inside(line: Line, frame: Keywords, numbers: dict[str, float]) -> Line:
     assert isinstance(line, Part | Group)
     inner = tuple((word, 0.0 if (word, value) in frame else value) for word, value in line.keywords)
     return line if inner == line.keywords else simplified(replace(line, keywords=inner), numbers)
-
-
-def _words(line: Line) -> int:
-    """How many words and operators its keywords and their values have."""
-    return sum(cost(tuple(_keywords(line))))
 
 
 def _drawn(line: Line, numbers: dict[str, float]) -> FloatArray:

@@ -41,17 +41,24 @@ FURTHER = {
 def written(layout: Layout, solution: Solution, free: FloatArray) -> Source:
     """The program, given the values (Z,) of its free numbers, with names for those that are shared and expressions for
     what follows; lines are grouped where that is shorter."""
-    sizes: dict[str, Value] = dict(zip(SIZES, (solution.factors[:3] @ free).tolist(), strict=True))
+    whole = solution.factors[:3] @ solution.chained() @ free
+    sizes: dict[str, Value] = dict(zip(SIZES, whole.tolist(), strict=True))
     header: list[Line] = []
     if np.array_equal(*solution.factors[:2]):
         header = [Assignment((("diameter", sizes["width"]),))]
         sizes |= dict.fromkeys(SIZES[:2], Name("diameter"))
     header.append(Assignment(tuple(sizes.items())))
-    numbers = sorted((k, float(value) + 0.0) for k, value in zip(solution.free, free, strict=True))
-    shared: dict[str, Value] = {layout.names[k]: value for k, value in numbers if k > 2}
+    shared: dict[str, Value] = {}
+    symbols = np.array([Linear.of(layout.names[k]) for k in solution.free])
+    for z in np.lexsort((solution.free, np.count_nonzero(solution.chained(), axis=1))):  # those measured from it follow
+        k, form = solution.free[z], solution.measured[z] @ symbols + float(free[z]) + 0.0
+        if not free[z] and len(form.factors) < 2:
+            symbols[z] = form  # zero, or equal to another
+        elif k > 2:
+            shared[layout.names[k]] = form.written()
     table: dict[str, Value] = {}  # how the numbers follow from the free ones
     sums: dict[Value, str] = {}  # equal sums have one name
-    forms = solution.factors.round(12) @ np.array([Linear.of(layout.names[k]) for k in solution.free])
+    forms = solution.factors.round(12) @ symbols
     for name, value in zip(layout.names[3:], (form.written() for form in forms[3:]), strict=True):
         is_sum = isinstance(value, Expression) and not isinstance(value, Name)
         table[name] = Name(sums.setdefault(value, f"{name}_sum")) if is_sum else value

@@ -22,7 +22,7 @@ from shapeprog.inference.fit.residuals import closeness
 from shapeprog.inference.fit.tunable import CELLS, DEGREES
 from shapeprog.inference.surface.evidence import Evidence, off_parts
 from shapeprog.inference.ties.anchors import anchors_of
-from shapeprog.inference.ties.expressions import DISTANCES, Solution, carried, solved
+from shapeprog.inference.ties.expressions import Solution, carried, solved
 from shapeprog.inference.ties.layout import Layout
 from shapeprog.inference.ties.misfit import Misfit
 from shapeprog.inference.ties.relations import Relation, relations, worthwhile
@@ -138,18 +138,15 @@ class _Ties:
         """The program tied at a price of a number, in the unit of the misfit.
 
         Where ties separate lines from the others, the joints of these weigh more, and its numbers are tied again, up to
-        ``TIES.repeats`` times.  Distances near zero are dropped.
+        ``TIES.repeats`` times.  What is near zero is zero.
         """
         self.misfit.together[:] = TIES.together
         for _ in range(TIES.repeats):
             solution, values = self._solved(price)
-            kinds = [self.layout.slots[k].kind for k in solution.free]
-            digits = (DEGREES if kind == "angle" else self.decimals for kind in kinds)
+            digits = (DEGREES if self.layout.slots[k].kind == "angle" else self.decimals for k in solution.free)
             free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
-            keep = (np.abs(free) > self.zero) | self.fixed[solution.free] | [kind not in DISTANCES for kind in kinds]
-            solution = Solution(solution.factors[:, keep], np.array(solution.free)[keep].tolist())
-            free = free[keep]
-            loose = self._loose(solution.factors @ free)
+            free[(np.abs(free) <= self.zero) & ~self.fixed[solution.free]] = 0.0
+            loose = self._loose(solution.factors @ solution.chained() @ free)
             loose = loose and loose - self._loose(self.layout.numbers)  # those that were so before do not count
             if not loose:
                 break

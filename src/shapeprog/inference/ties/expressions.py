@@ -36,11 +36,11 @@ class Solution(NamedTuple):
 
     factors: FloatArray  # of every number by how much it follows from each free one (P, Z)
     free: list[int]  # which numbers are free (Z,)
-    measured: FloatArray  # by how much each free number is measured from another one (Z, Z)
+    measured: FloatArray  # factors, mostly 1 or -1, of those that each free number is measured from (Z, Z)
 
     def chained(self) -> FloatArray:
-        """How each free number follows from the distances from those that they are measured from (Z, Z)."""
-        return np.linalg.inv(np.eye(len(self.free)) - self.measured).astype(np.float64)
+        """How each free number follows from all, less what they are measured from (Z, Z); in whole numbers."""
+        return np.rint(np.linalg.inv(np.eye(len(self.free)) - self.measured)).astype(np.float64)
 
 
 def solved(slots: list[Slot], rows: FloatArray) -> Solution:
@@ -90,7 +90,7 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
 
 def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[Solution, FloatArray]:
     """The same with free numbers measured from others, so that fewer parts are separated when a shared one changes; and
-    the free numbers (Z,), without what they are measured from, given all (P,)."""
+    the values of the free numbers (Z,), less what they are measured from, given those of all (P,)."""
     factors, free, measured = solution
     pairs = np.stack(touching(boxes_of(layout.scene(numbers)), TIES.zero), 1)
     together = _pieces(layout, numbers, pairs, np.zeros((1, len(numbers))))

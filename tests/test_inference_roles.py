@@ -93,6 +93,7 @@ box(at=(-12, -5, -7), size=(5.5, 0.4, 14))  # drawer
 
 BED = """
 box(at=(-3, -11, -8), size=(3, 21, 16))  # mattress
+box(at=(-4.2, -11, -8), size=(1.2, 21, 16))  # base
 box(at=(-6, 10.5, -9), size=(12, 1, 18))  # headboard
 box(at=(-6, -12, -9), size=(6, 1, 18))  # footboard
 for i in mirror(side):

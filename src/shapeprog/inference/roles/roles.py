@@ -39,7 +39,7 @@ SUPPORTING: tuple[Rule, ...] = (
     ("pedestal", lambda p: p.below & p.central & p.upright & (p.equal == 1)),
     ("foot", lambda p: p.below & p.grounded & ~p.level & p.small),
     ("leg", lambda p: p.below & p.upright),
-    ("base", lambda p: p.below & p.slender & p.grounded),
+    ("base", lambda p: p.below & (p.wide | (p.slender & p.grounded))),
     ("apron", lambda p: (p.below | p.alongside) & p.level & (p.top >= p.main_low[UP] - 1.5 * p.near)),
     ("stretcher", lambda p: p.below & ~p.grounded & (p.level | p.lying)),
     ("leg", lambda p: p.below),

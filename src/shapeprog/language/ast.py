@@ -145,7 +145,7 @@ class Scale:
     cells_per_unit: float  # cells per unit of length; as read, the longest side of the whole is 24 cells
     floor: float  # height of the floor in the grid, in cells
     middle: float = 0.0  # depth of the middle of the whole in the grid, in cells
-    side: float = 0.0  # how far the middle of the whole is to the left of that of the grid, in cells
+    side: float = 0.0  # left-right middle of the whole in the grid, in cells; 0 but in the grid of another shape
 
     @property
     def origin(self) -> tuple[float, float, float]:

@@ -173,7 +173,7 @@ def _remark(text: str) -> str:
 
 
 def assigned(pairs: Iterable[tuple[str, Value]]) -> list[Assignment]:
-    """Names and their values on as many lines as it takes; the names of one line are not known there yet."""
+    """Assignments of names to values; a value that uses a name of the current line starts the next one."""
     lines: list[list[tuple[str, Value]]] = [[]]
     for pair in pairs:
         long = sum(len(f"{name}{value}") + 4 for name, value in [*lines[-1], pair]) > 118

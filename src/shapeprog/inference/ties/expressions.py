@@ -32,14 +32,14 @@ NOTHING = 1e-7  # factors up to this are zero
 
 
 class Solution(NamedTuple):
-    """Free numbers, and how all numbers follow from them."""
+    """Free numbers, and how all numbers follow from them: as ``factors @ chained() @ offsets``."""
 
-    factors: FloatArray  # of every number by how much it follows from each free one (P, Z)
-    free: list[int]  # which numbers are free (Z,)
-    measured: FloatArray  # factors, mostly 1 or -1, of those that each free number is measured from (Z, Z)
+    factors: FloatArray  # coefficients (P, Z) of the free numbers in every number
+    free: list[int]  # indices (Z,) of the free numbers
+    measured: FloatArray  # coefficients (Z, Z), whole, of those that each free number is measured from; else zero
 
     def chained(self) -> FloatArray:
-        """How each free number follows from all, less what they are measured from (Z, Z); in whole numbers."""
+        """The matrix (Z, Z) from offsets, free numbers less those that they are measured from, to the free numbers."""
         return np.rint(np.linalg.inv(np.eye(len(self.free)) - self.measured)).astype(np.float64)
 
 
@@ -89,8 +89,8 @@ def _cost(factors: FloatArray, sizes: Array) -> float:
 
 
 def carried(solution: Solution, layout: Layout, numbers: FloatArray) -> tuple[Solution, FloatArray]:
-    """The same with free numbers measured from others, so that fewer parts are separated when a shared one changes; and
-    the values of the free numbers (Z,), less what they are measured from, given those of all (P,)."""
+    """The solution with free numbers measured from others, so that fewer parts are separated when a shared one changes;
+    and the offsets (Z,), given all numbers (P,)."""
     factors, free, measured = solution
     pairs = np.stack(touching(boxes_of(layout.scene(numbers)), TIES.zero), 1)
     together = _pieces(layout, numbers, pairs, np.zeros((1, len(numbers))))

@@ -85,7 +85,7 @@ class TieSettings:
     farthest: float = 0.5  # that one step moves a number
 
     # Text
-    zero: float = 0.015  # distances up to this are no numbers
+    zero: float = 0.015  # numbers up to this are zero, and parts with a gap up to this touch
     negative: float = 1.5  # operators that a size is worth which may become negative: a difference
     repeated: float = 0.1  # operators that every use of a sum after the first is worth, as it can be named
     thin: float = 0.6  # the thickness of a part is at most this share of its next longer side

@@ -39,8 +39,8 @@ FURTHER = {
 
 
 def written(layout: Layout, solution: Solution, free: FloatArray) -> Source:
-    """The program, given the values (Z,) of its free numbers, less what they are measured from, with names for those
-    that are shared and expressions for what follows; lines are grouped where that is shorter."""
+    """The program, given the offsets (Z,) of its free numbers, with names for those that are shared and expressions for
+    what follows; lines are grouped where that is shorter."""
     whole = solution.factors[:3] @ solution.chained() @ free
     sizes: dict[str, Value] = dict(zip(SIZES, whole.tolist(), strict=True))
     header: list[Line] = []
@@ -50,7 +50,7 @@ def written(layout: Layout, solution: Solution, free: FloatArray) -> Source:
     header.append(Assignment(tuple(sizes.items())))
     shared: dict[str, Value] = {}
     symbols = np.array([Linear.of(layout.names[k]) for k in solution.free])
-    for z in np.lexsort((solution.free, np.count_nonzero(solution.chained(), axis=1))):  # those that follow come last
+    for z in np.lexsort((solution.free, np.count_nonzero(solution.chained(), axis=1))):  # by number of origins
         k, form = solution.free[z], solution.measured[z] @ symbols + float(free[z]) + 0.0
         if not free[z] and len(form.factors) < 2:
             symbols[z] = form  # zero, or equal to another

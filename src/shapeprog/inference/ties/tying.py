@@ -123,7 +123,7 @@ class _Ties:
             minimum[:3] = np.maximum(minimum[:3], TIES.extent)
         self.misfit = Misfit(layout, evidence, joints, minimum, seed)
         self.decimals = CELLS if known else CELLS + 1  # what is inferred is rounded again
-        self.zero = 0.0 if known else TIES.zero  # a distance that somebody wrote stays
+        self.zero = 0.0 if known else TIES.zero  # a number that somebody wrote stays
 
     def _is_exact(self, evidence: Evidence) -> bool:
         """Whether relations that nearly hold mostly hold exactly, as in a drawing by CAD, and parts are components; in
@@ -138,13 +138,13 @@ class _Ties:
         """The program tied at a price of a number, in the unit of the misfit.
 
         Where ties separate lines from the others, the joints of these weigh more, and its numbers are tied again, up to
-        ``TIES.repeats`` times.  What is near zero is zero.
+        ``TIES.repeats`` times.  Numbers of at most ``TIES.zero`` become zero, unless somebody wrote them.
         """
         self.misfit.together[:] = TIES.together
         for _ in range(TIES.repeats):
-            solution, values = self._solved(price)
+            solution, offsets = self._solved(price)
             digits = (DEGREES if self.layout.slots[k].kind == "angle" else self.decimals for k in solution.free)
-            free = np.array([to_float32(number) for number in map(round, values.tolist(), digits)])
+            free = np.array([to_float32(number) for number in map(round, offsets.tolist(), digits)])
             free[(np.abs(free) <= self.zero) & ~self.fixed[solution.free]] = 0.0
             loose = self._loose(solution.factors @ solution.chained() @ free)
             loose = loose and loose - self._loose(self.layout.numbers)  # those that were so before do not count
@@ -159,7 +159,7 @@ class _Ties:
         return {self.layout.parts[block] for block in scene.block[pieces_of_parts(scene) > 0].tolist()}
 
     def _solved(self, price: float) -> tuple[Solution, FloatArray]:
-        """The free numbers at a price of a number, and their values (Z,)."""
+        """The free numbers at a price of a number, and their offsets (Z,)."""
         layout, numbers, rows = self.layout, self.layout.numbers, self.layout.fixed()
         for step in range(TIES.rounds):
             candidates, before = [Relation(row, math.inf) for row in rows], len(rows)

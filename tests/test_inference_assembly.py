@@ -363,6 +363,27 @@ def test_blocks_inside_others_and_copies_are_pruned_but_not_what_connects() -> N
     assert _pruned(whole, coverage) == whole
 
 
+TABLE = "box(at=(2, -8, -12), size=(1, 16, 24))\nfor i in mirror(side):\n    box(at=(-12, -1, 8), size=(14, 2, 2))"
+
+
+def with_stretcher(low: float, high: float) -> Program:
+    """A table with two legs and a stretcher that ends at these sides."""
+    return parse(f"{TABLE}\nbox(at=(-6, -0.5, {low}), size=(1, 1, {high - low}))")
+
+
+@pytest.mark.parametrize(("low", "high"), [(-8, 9.5), (-9, 8.1), (-8, 7.3)])
+def test_a_part_with_an_end_inside_another_or_too_short_is_centred_and_reaches_the_legs(low: float, high: float):
+    uneven, coverage = with_stretcher(low, high), Coverage(evidence_of_program(with_stretcher(-8, 8)))
+    scene = unroll(_unharmed(uneven, uneven, coverage))
+    assert scene.centre[-1].tolist() == [-5.5, 0, 0]
+    assert 7.9 < scene.reach[-1, 2] < 10
+
+
+def test_a_part_of_one_side_stays_there():
+    uneven = with_stretcher(-8, 6)
+    assert _unharmed(uneven, uneven, Coverage(evidence_of_program(uneven))) == uneven
+
+
 def test_a_ladder_of_thirty_rungs_has_each_rung_once() -> None:
     rungs = "for i in translate(30, by=(0.774, 0, 0)):\n    box(at=(-11.226, -0.05, -0.6), size=(0.0774, 0.1, 1.18))"
     ladder = f"{rungs}\nfor i in mirror(side):\n    box(at=(-12, -0.05, 0.59), size=(24, 0.1, 0.103))"

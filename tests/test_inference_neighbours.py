@@ -111,6 +111,14 @@ def test_a_floating_leg_reaches_the_seat(height):
     assert pieces(*union_mesh(unroll(found))) == 1
 
 
+def test_a_rail_that_floats_between_legs_reaches_both_and_stays_in_the_middle():
+    rail = "box(at=(-6, -0.5, -7), size=(1, 1, 14))\n"
+    found = connected(parse(TABLE + rail), Coverage(evidence(TABLE + "box(at=(-6, -0.5, -8), size=(1, 1, 16))\n")))
+    scene = unroll(found)
+    assert scene.centre[-1, 2] == 0
+    assert scene.reach[-1, 2] == pytest.approx(8, abs=0.1)
+
+
 def test_a_leaning_leg_is_stretched_along_itself():
     leg = "for i in mirror(side):\n    bar(start=(-12, 0, 11), end=({up}, 0, {side}), section=(1, 1))\n"
     program = parse(SEAT + leg.format(up=0, side=8.43))

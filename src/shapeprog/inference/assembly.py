@@ -1,9 +1,9 @@
 """Structure from the surface: a program of few blocks that explains the visible surface of a target.
 
 Pieces of the target become single blocks, and copies among them loops.  A first choice is fitted briefly, then competes
-with its neighbours and with boxes around unexplained points.  The result is connected, fitted, restored or shortened
-where that costs nothing, moved onto the planes of a mesh, drawn on its components, pruned, and connected again.  Then
-pairs of different roles are separated, and all parts get roles and an order.  A whole of another size is chosen again.
+with its neighbours and with boxes around unexplained points.  The result is connected, fitted, moved onto the planes of
+a mesh, separated where pairs have different roles, drawn on components, pruned, and connected again; changes that harm
+are undone, and parts are centred and texts shortened where that is free.  A whole of another size is chosen again.
 """
 
 from __future__ import annotations
@@ -62,11 +62,10 @@ def assemble(
     report("finding structure", 1.0)
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
-    fitted = on_planes(_unharmed(adjusted, start, coverage), evidence)
+    fitted = separated(on_planes(_unharmed(adjusted, start, coverage), evidence), blocks)
     exact = _unharmed(snapped(fitted, evidence), fitted, coverage, 0.08)
     program = connected(_pruned(exact, coverage), coverage)
-    program = canonical_side(simplest(program))
-    program = in_order(with_roles(separated(program, blocks)))
+    program = in_order(with_roles(canonical_side(simplest(program))))
     table = coverage.table([*program.body, *others[:1]])
     share, more = (explained(table, range(number)) for number in (program.blocks, len(table.prices)))
     hidden = float(evidence.weights[evidence.weights < evidence.weights.max()].sum())
@@ -84,8 +83,7 @@ def _candidates(evidence: Evidence) -> list[Node]:
     pieces = find_pieces(evidence)
     singles = distinct(single_candidates(pieces))
     components = pieces.boxes.take(pieces.boxes.straight & (pieces.source == Source.COMPONENT.value))
-    boxes = [[Box(*box)] for box in zip(*components, strict=True)]
-    loops = repeated(singles, list(rows(boxes)))
+    loops = repeated(singles, list(rows([[Box(*box)] for box in zip(*components, strict=True)])))
     loops = distinct([*loops, *images([*singles, *loops], pieces.cloud.points)])
     return [*singles[: MOST_CANDIDATES // 2], *loops][:MOST_CANDIDATES]
 
@@ -121,19 +119,21 @@ def _choice(
 def _unharmed(adjusted: Program, start: Program, coverage: Coverage, harm: float = 0.005) -> Program:
     """The adjusted program; blocks whose adjustment costs more than ``harm`` of the target are restored.
 
-    A block loses a loop, or nested loops become one row, where the text becomes cheaper and that costs less than .001,
-    the error of the coverage; and a row loses a copy that costs nothing, such as a shelf inside the top.
+    A block loses a loop, nested loops become one row, or a part slightly off the middle is centred, where the text
+    becomes cheaper and that costs less than .001, the error of the coverage; and a row loses a copy that costs nothing,
+    such as a shelf inside the top.  Of two texts of equal price the more valuable stays.
     """
     options = [(index, node, harm) for index, node in enumerate(start.body)]
     for index, (chain, solids) in enumerate(zip(adjusted.chains, solid_boxes(adjusted.draws), strict=True)):
-        options += [(index, node, -0.001) for node in shorter(chain)]
+        options += [(index, node, -0.001) for node in shorter(chain, solids)]
         options += [(index, node, -0.00001) for node in recounted(chain, solids, -1)]
     nodes = [*adjusted.body, *(node for _, node, _ in options)]
     table, selected = coverage.table(nodes), tuple(range(len(start.body)))
     text = [(price, Program((node,)).size) for price, node in zip(table.prices, nodes, strict=True)]
     for option, (index, _, least) in enumerate(options, len(selected)):
-        trial = (*selected[:index], option, *selected[index + 1 :])
-        if (least > 0 or text[option] < text[selected[index]]) and value(table, trial) > value(table, selected) + least:
+        trial, before = (*selected[:index], option, *selected[index + 1 :]), text[selected[index]]
+        needed = max(least, 0.0) if text[option] == before else least
+        if (least > 0 or text[option] <= before) and value(table, trial) > value(table, selected) + needed:
             selected = trial
     return Program(tuple(nodes[option] for option in selected))
 

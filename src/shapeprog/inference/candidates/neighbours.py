@@ -58,11 +58,15 @@ def neighbours(program: Program) -> list[Node]:
     return [node for node in dict.fromkeys(result) if node not in existing]
 
 
-def shorter(chain: Chain) -> Iterator[Node]:
-    """A block without one of its loops, and rows of the copies that several loops draw."""
+def shorter(chain: Chain, boxes: Sequence[Box]) -> Iterator[Node]:
+    """A block without one of its loops, rows of the copies that several loops draw, and the block in the middle;
+    ``boxes`` are those around its solids."""
     yield from _unlooped(chain)
     if len(chain) > 2:
         yield from rows([[box] for box in solid_boxes([nest(chain)])[0]])
+    for box in boxes if len(boxes) == 1 else ():
+        for even in centred(box):
+            yield from redrawn(chain, even)
 
 
 def redrawn(chain: Chain, box: Box) -> Iterator[Node]:

@@ -65,9 +65,8 @@ def tidy(block: FloatArray) -> FloatArray:
 def _cells(block: FloatArray) -> float:
     """About how many cells a block covers."""
     extents, copies = block[EXTENT : EXTENT + 3], block[COUNT1] * block[COUNT2]
-    if int(block[FORM]) == DISC:
-        return float(3.14 * extents[0] * extents[1] ** 2 * copies)
-    return float(extents.prod() * copies)
+    one = 3.14 * extents[0] * extents[1] ** 2 if int(block[FORM]) == DISC else extents.prod()
+    return float(one * copies)
 
 
 def _node(block: FloatArray, role: str = "") -> Node:
@@ -83,7 +82,5 @@ def _node(block: FloatArray, role: str = "") -> Node:
             at[axes] += size[axes]
             break
         name = CENTRED[name]
-    loops = (
-        Loop("translate", tuple(block[loop : loop + 4].tolist()), ()) for loop in (COUNT1, COUNT2) if block[loop] > 1
-    )
+    loops = (Loop("translate", tuple(block[k : k + 4].tolist()), ()) for k in (COUNT1, COUNT2) if block[k] > 1)
     return nest((*loops, Draw(name, tuple(numbers[: language()[name].size].tolist()))))

@@ -13,7 +13,7 @@ import numpy as np
 from shapeprog.geometry.contacts import contact_groups
 from shapeprog.geometry.mesh import pieces_of_parts
 from shapeprog.inference.candidates.drawings import solid_boxes
-from shapeprog.inference.candidates.neighbours import met, redrawn
+from shapeprog.inference.candidates.neighbours import centred, met, redrawn
 from shapeprog.inference.choice.choice import value
 from shapeprog.inference.choice.coverage import Coverage
 from shapeprog.inference.choice.settings import SETTINGS
@@ -72,10 +72,12 @@ def _options(program: Program) -> list[Program]:
 
 
 def _reaching(chain: Chain, original: Box, copies: list[Box], parts: list[Box]) -> Iterator[Node]:
-    """A block, whose statement draws the ``original`` box, extended so that one of its copies reaches a part."""
+    """A block, whose statement draws the ``original`` box, extended so that one of its copies reaches a part; also at
+    both ends alike, where it then lies in the middle."""
     for copy in copies:
         for longer in met(copy, parts, SETTINGS.lines, longer=True):
             along = (longer.centre - copy.centre) @ copy.rotation
             for moved in (along, -along):  # at a mirrored copy the other end may be extended
-                centre = original.centre + original.rotation @ moved
-                yield from redrawn(chain, Box(centre, original.rotation, longer.half))
+                box = Box(original.centre + original.rotation @ moved, original.rotation, longer.half)
+                for each in (box, *centred(box)):
+                    yield from redrawn(chain, each)

@@ -162,13 +162,10 @@ def centred(scene: Scene, candidates: Sequence[Program]) -> IntArray:
     middle = np.einsum("bn,bni->bi", share, scene.centre.numpy())
     saving = (np.abs(middle) < SETTINGS.even) & [False, True, True]
     for row, axis in np.argwhere(saving).tolist():
-        saving[row, axis] = not any(_around(node, axis) for node in candidates[row].walk())
+        for node in candidates[row].walk():
+            pair = node.name == "translate" and node.values[0] == 2 and node.values[1 + axis] != 0
+            saving[row, axis] &= not (pair or mirrors(node, axis) or node.name.startswith("rotate"))
     return saving.sum(1)
-
-
-def _around(node: Node, axis: int) -> bool:
-    pair = node.name == "translate" and node.values[0] == 2 and node.values[1 + axis] != 0
-    return pair or mirrors(node, axis) or node.name.startswith("rotate")
 
 
 def square(scene: Scene) -> BoolArray:

@@ -246,7 +246,7 @@ def test_looks_do_not_depend_on_how_a_solid_is_written():
 
 def test_solids_with_others_inside_are_not_drawn_as_hollow():
     found = assembled(load(EXAMPLES / "armchair_kaykit.obj")).program
-    assert found.blocks <= 6
+    assert found.blocks <= 7
     assert unroll(found).bounds.amin() > 0.2  # half of the thinnest part: walls of the arms would be of .1 cells
 
 

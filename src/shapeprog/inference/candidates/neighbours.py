@@ -59,13 +59,13 @@ def neighbours(program: Program) -> list[Node]:
 
 
 def shorter(chain: Chain, boxes: Sequence[Box]) -> Iterator[Node]:
-    """A block without one of its loops, rows of the copies that several loops draw, and the block in the middle;
-    ``boxes`` are those around its solids."""
+    """A block without one of its loops, rows of the copies that several loops draw, and the block centred from left to
+    right; ``boxes`` are those around its solids."""
     yield from _unlooped(chain)
     if len(chain) > 2:
         yield from rows([[box] for box in solid_boxes([nest(chain)])[0]])
     for box in boxes if len(boxes) == 1 else ():
-        for even in centred(box):
+        for even in centred(box, SIDE):
             yield from redrawn(chain, even)
 
 
@@ -148,12 +148,10 @@ def met(
                     yield Box(box.centre + (end - box.half[axis]) / 2 * along, box.rotation, half)
 
 
-def centred(box: Box) -> Iterator[Box]:
-    """Boxes centred on the middle plane of the shape, left to right or in depth, from a box that is slightly off it.
-
-    One of the two ends of the box stays.
-    """
-    for axis in (SIDE, DEPTH):
+def centred(box: Box, *axes: int) -> Iterator[Box]:
+    """Boxes centred on a middle plane of the shape, by default left to right or in depth, from a box that is slightly
+    off it.  One of the two ends of the box stays."""
+    for axis in axes or (SIDE, DEPTH):
         along = int(np.abs(box.rotation[axis]).argmax())
         off = abs(float(box.centre[axis]))
         near = SETTINGS.off_least < off < min(SETTINGS.off_most, box.half[along] / 2)

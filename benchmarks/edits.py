@@ -69,7 +69,7 @@ def columns_of(mesh: str, changes: tuple[str, ...]) -> list[Column]:
     rows: list[tuple[tuple[str, str], tuple[Any, Any]]] = [(("named numbers", "plain numbers"), (named, plain))]
     before = {each.name: each for each in names(named)}
     for change in changes:
-        after = changed(named, [change])
+        after, _ = changed(named, [change])
         name = change.partition("=")[0].rstrip("*+-/")
         value = {each.name: each.value for each in names(after)}[name]
         caption, other = without_names(plain, before[name], value)

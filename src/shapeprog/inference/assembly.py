@@ -97,10 +97,8 @@ def _chosen(
     first, others = _choice(candidates, coverage, blocks, seed)
     if not first or deadline.passed("another choice among neighbours"):
         return first, others
-    loose = first
-    if evidence.mesh is None:
-        wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
-        loose, _ = _choice(candidates, Coverage(wide, coverage.prices), blocks, seed)
+    wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
+    loose = _choice(candidates, Coverage(wide, coverage.prices), blocks, seed)[0] if evidence.mesh is None else first
     pool = first.copy()
     for nodes in [first, loose] if loose != first else [first]:
         adjusted = adjust(Program(tuple(nodes)), evidence, steps=8, deadline=deadline)

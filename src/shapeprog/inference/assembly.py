@@ -65,7 +65,7 @@ def assemble(
     fitted = separated(on_planes(_unharmed(adjusted, start, coverage), evidence), blocks)
     exact = _unharmed(snapped(fitted, evidence), fitted, coverage, 0.08)
     program = connected(_pruned(exact, coverage), coverage)
-    program = in_order(with_roles(separated(canonical_side(simplest(program)), blocks)))
+    program = in_order(with_roles(separated(canonical_side(simplest(program)), blocks)))  # pruning may change roles
     table = coverage.table([*program.body, *others[:1]])
     share, more = (explained(table, range(number)) for number in (program.blocks, len(table.prices)))
     hidden = float(evidence.weights[evidence.weights < evidence.weights.max()].sum())
@@ -91,16 +91,18 @@ def _candidates(evidence: Evidence) -> list[Node]:
 def _chosen(
     candidates: list[Node], coverage: Coverage, blocks: int, seed: int, deadline: Deadline
 ) -> tuple[list[Node], list[Node]]:
-    """A choice among a first one, for scans also one with a wide tolerance, their adjusted forms and neighbours, boxes
-    around unexplained points, and candidates passed over; and the others, those that would explain most first."""
+    """A choice among a first one, for point clouds also one with a wide tolerance, their adjusted forms and neighbours,
+    boxes around unexplained points, and candidates passed over; and the others, those that would explain most first."""
     evidence = coverage.evidence
     first, others = _choice(candidates, coverage, blocks, seed)
     if not first or deadline.passed("another choice among neighbours"):
         return first, others
-    wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
-    loose = _choice(candidates, Coverage(wide, coverage.prices), blocks, seed)[0] if evidence.mesh is None else first
+    starts = [first]
+    if evidence.mesh is None:
+        wide = replace(evidence, tolerance=1.5 * evidence.tolerance, reach=1.5 * evidence.reach)
+        starts.append(_choice(candidates, Coverage(wide, coverage.prices), blocks, seed)[0])
     pool = first.copy()
-    for nodes in [first, loose] if loose != first else [first]:
+    for nodes in starts:
         adjusted = adjust(Program(tuple(nodes)), evidence, steps=8, deadline=deadline)
         pool += [*nodes, *adjusted.body, *neighbours(adjusted), *residual_candidates(adjusted, evidence)]
     pool = list(dict.fromkeys([*pool, *others[:200]]))  # the first choice first: the search starts there

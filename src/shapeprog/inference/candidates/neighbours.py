@@ -65,8 +65,8 @@ def shorter(chain: Chain, boxes: Sequence[Box]) -> Iterator[Node]:
     if len(chain) > 2:
         yield from rows([[box] for box in solid_boxes([nest(chain)])[0]])
     for box in boxes if len(boxes) == 1 else ():
-        for even in centred(box, SIDE):
-            yield from redrawn(chain, even)
+        for candidate in centred(box, SIDE):
+            yield from redrawn(chain, candidate)
 
 
 def redrawn(chain: Chain, box: Box) -> Iterator[Node]:

@@ -11,6 +11,8 @@ from shapeprog.geometry import surface as room
 from shapeprog.geometry.arrays import table_of
 from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.surface import sample_surface
+from shapeprog.language.parser import parse
+from shapeprog.language.unroll import unroll
 
 
 def seeded(seed=0):
@@ -52,6 +54,17 @@ def test_gradient_of_placing_is_that_of_the_declarations():
     for got, expected in zip(fast, slow, strict=True):
         torch.testing.assert_close(got, expected)
     assert sample_surface(scene, 20, seeded()).points.requires_grad
+
+
+def test_a_block_is_hidden_inside_others_and_shown_where_it_stands_out_of_them():
+    scene = unroll(parse("""
+box(at=(0, 0, 0), size=(4, 4, 4))
+box(at=(0, 0, 4), size=(4, 4, 4))
+box(at=(1, 1, 1), size=(2, 2, 6))
+box(at=(2.1, 1, 1), size=(2, 2, 2))
+cylinder(at=(0, 2, 2), height=4.01, radius=1)
+"""))  # fmt: skip
+    assert room.hidden_groups(scene, scene.block) == {2, 4}
 
 
 def test_two_overlapping_cubes_show_their_exact_areas():

@@ -363,6 +363,14 @@ def test_blocks_inside_others_and_copies_are_pruned_but_not_what_connects() -> N
     assert _pruned(whole, coverage) == whole
 
 
+def test_slats_inside_a_thin_seat_are_pruned_though_points_of_the_target_lie_on_them() -> None:
+    slats = parse("for i in translate(4, by=(0, 6, 0)):\n    box(at=(0, -11, -12), size=(0.4, 4, 24))")
+    seat = parse("box(at=(0, -11, -12), size=(0.4, 22, 24))")
+    both = Program((*seat.body, *slats.body))
+    assert _pruned(both, Coverage(evidence_of_program(slats))) == seat
+    assert _pruned(Program((*seat.body, *seat.body)), Coverage(evidence_of_program(seat))) == seat
+
+
 TABLE = "box(at=(2, -8, -12), size=(1, 16, 24))\nfor i in mirror(side):\n    box(at=(-12, -1, 8), size=(14, 2, 2))"
 
 

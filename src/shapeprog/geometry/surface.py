@@ -13,6 +13,7 @@ the line along which one part becomes hidden in another moves: errors of the fir
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -26,12 +27,15 @@ from shapeprog.errors import ShapeProgError
 from shapeprog.geometry import surface_kernels as kernels
 from shapeprog.geometry.arrays import cast, first_order, gradients, numbers, over_threads, table_of
 from shapeprog.geometry.batch import Batch, check_batch
+from shapeprog.geometry.contacts import TOUCHING
+from shapeprog.geometry.distance import each_distance
 from shapeprog.geometry.distance_kernels import FARTHEST
 from shapeprog.geometry.primitives import primitives
 from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
 SKIN = 1e-3  # how far in cells off the surface a point is looked at to see whether it is hidden
+SHOWN = 4096  # points of the visible surface that tell which groups it shows
 PATIENCE = 64  # candidates drawn for each point wanted before a scene is given up
 
 
@@ -109,6 +113,14 @@ def sample_surface(batch: Batch, n: int, generator: torch.Generator | None = Non
 
 
 sample = sample_surface  # its public name, shapeprog.sample
+
+
+def hidden_groups(batch: Batch, group: Int[Tensor, " N"]) -> set[int]:
+    """The groups of primitives of one scene whose surface lies inside others, or at most ``TOUCHING`` outside."""
+    shown = sample_surface(batch, SHOWN, torch.Generator().manual_seed(0))
+    away, owner = each_distance(batch, shown.points), group[shown.slot]
+    visible = away.masked_fill(group == owner[:, None], math.inf).amin(1) > TOUCHING
+    return {*group.tolist()} - {*owner[visible].tolist()}
 
 
 def face_areas(flat: Batch) -> Float[Tensor, "B N F"]:

@@ -14,6 +14,7 @@ from functools import partial
 from typing import NamedTuple
 
 from shapeprog.data.remarks import remark_on_size
+from shapeprog.geometry.surface import hidden_groups
 from shapeprog.inference.budget import NEVER, Deadline, Progress
 from shapeprog.inference.candidates.drawings import canonical_side, simplest, solid_boxes
 from shapeprog.inference.candidates.loops import distinct, images, repeated, rows
@@ -59,7 +60,6 @@ def assemble(
         return Assembly(Program(), 0.0, "")
     report("finding structure", 0.7)
     chosen, others = _chosen(candidates, coverage, blocks, seed, deadline)
-    report("finding structure", 1.0)
     start = connected(Program(tuple(chosen)), coverage)
     adjusted = adjust(start, evidence, deadline=deadline, progress=progress)
     fitted = separated(on_planes(_unharmed(adjusted, start, coverage), evidence), blocks)
@@ -141,14 +141,14 @@ def _unharmed(adjusted: Program, start: Program, coverage: Coverage, harm: float
 
 
 def _pruned(program: Program, coverage: Coverage) -> Program:
-    """The program without blocks that cost more than they explain and connect nothing, such as one inside another."""
-    table, every = coverage.table(program.body), tuple(range(program.blocks))
-    fewer = (every[:index] + every[index + 1 :] for index in every)
-    worth = [rest for rest in fewer if value(table, rest) > value(table, every)]
+    """The program without blocks that connect nothing and cost more than they explain, or are hidden in others."""
+    table, every, scene = coverage.table(program.body), tuple(range(program.blocks)), unroll(program)
+    hidden = hidden_groups(scene, scene.block)
+    fewer = [(every[:index] + every[index + 1 :], index in hidden) for index in every]
+    worth = [rest for rest, unseen in fewer if unseen or value(table, rest) > value(table, every)]
     for rest in sorted(worth, key=partial(value, table), reverse=True):
         left = Program(tuple(program.body[index] for index in rest))
-        loose = [len(floating(connected(each, coverage))) for each in (left, program)]
-        if loose[0] <= loose[1]:
+        if len(floating(connected(left, coverage))) <= len(floating(connected(program, coverage))):
             return _pruned(left, coverage)
     return program
 

@@ -457,6 +457,13 @@ def test_tidy_writes_equal_loops_once(tmp_path: Path):
     assert found.count("for _ in mirror(x=0):") == 1
 
 
+def test_what_ties_hide_in_other_parts_is_left_out_unless_somebody_wrote_it():
+    text = "box(at=(0, -8, -12), size=(1, 16, 24))\nbox(at=(0.04, -8, -12), size=(0.99, 16, 24))\n"
+    program = sp.parse(text)
+    blocks = [tie(program, evidence_of_program(program), known=known).blocks for known in (False, True)]
+    assert blocks == [1, 2]
+
+
 def test_numbers_that_somebody_wrote_are_known_even_where_they_are_hidden():
     # The rod ends inside the box, .3 cells below its top, where nobody sees it.
     text = "box(at=(0, -4, -4), size=(8, 8, 8))\nrod(start=(-9, 0, 0), end=(7.7, 0, 0), radius=1)\n"

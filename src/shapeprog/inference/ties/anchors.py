@@ -196,13 +196,6 @@ def anchors_of(layout: Layout) -> dict[Key, Anchors]:
     boxes = boxes_of(layout.scene(layout.numbers))
     pairs = touching(boxes, TIES.touch)
     boxes = boxes._replace(centre=boxes.centre - [-width / 2, scale.middle - depth / 2, scale.floor])
-    result: dict[Key, Anchors] = {}
-    for axis in range(3):
-        solver = _AxisAnchors(layout, axis, boxes, pairs)
-        for element, anchors in zip(solver.elements, solver.solved(), strict=True):
-            result[element.line, element.key, axis] = anchors
-        for last, first in solver.rows.items():
-            copy, original = solver.elements[last], solver.elements[first]
-            if abs(copy.low - original.low) < TIES.within:  # a row that does not run along this axis
-                result[copy.line, copy.key, axis] = result[original.line, original.key, axis][:1]
-    return result
+    solvers = [_AxisAnchors(layout, axis, boxes, pairs) for axis in range(3)]
+    solved = (pair for solver in solvers for pair in zip(solver.elements, solver.solved(), strict=True))
+    return {(element.line, element.key, element.axis): anchors for element, anchors in solved}

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from shapeprog.errors import ShapeProgError
 from shapeprog.geometry.arrays import one_thread
 from shapeprog.geometry.mesh import pieces_of_parts
+from shapeprog.geometry.surface import hidden_groups
 from shapeprog.inference.fit.joints import find_joints
 from shapeprog.inference.fit.residuals import closeness
 from shapeprog.inference.fit.tunable import CELLS, DEGREES
@@ -33,7 +34,7 @@ from shapeprog.language.convert import placed
 from shapeprog.language.evaluate import evaluated
 from shapeprog.language.merging import merged
 from shapeprog.language.parameters import to_float32
-from shapeprog.language.program import Program
+from shapeprog.language.program import Program, nest
 from shapeprog.language.unroll import unroll
 from shapeprog.space import FloatArray
 
@@ -50,8 +51,8 @@ def tie(
 ) -> Program:
     """The same program placed from the sides, with names for shared numbers; the same for the same seed.
 
-    Where more than ``TIES.lost`` of the closeness of the surfaces is lost, numbers are tied at lower prices.  The same
-    program comes back if a statement has no placed form.
+    Numbers are tied at lower prices where more than ``TIES.lost`` of the closeness of the surfaces is lost.  Parts that
+    ties hide in others are left out.  The same program comes back if a statement has no placed form.
 
     Parameters
     ----------
@@ -95,6 +96,10 @@ def tie(
                 tied, least = offered, lost
             if lost <= TIES.lost:
                 break
+    scene = unroll(tied)
+    if not (known or held) and (hidden := hidden_groups(scene, scene.block)):
+        shown = [nest(chain) for index, chain in enumerate(tied.chains) if index != max(hidden)]
+        return tie(Program(tuple(shown)), evidence, price=price, floor=floor, seed=seed)
     return tied
 
 

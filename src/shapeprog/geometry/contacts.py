@@ -1,6 +1,6 @@
 """Parts that touch, for many scenes at once, and connected components of graphs.
 
-Pairs whose boxes along the axes of the grid overlap are compared by alternating projections (von Neumann 1933).
+Pairs whose oriented boxes overlap are compared by alternating projections (von Neumann 1933).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import numpy as np
 from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import array, table_of
 from shapeprog.geometry.batch import Batch
+from shapeprog.geometry.separation import OrientedBoxes, gaps
 from shapeprog.kernels.table import CENTRE, ROTATION, WIDTH
 from shapeprog.space import Array, BoolArray, IntArray
 
@@ -41,7 +42,9 @@ def touching(scenes: Batch, within: float) -> BoolArray:
 
     Projections of parts that barely overlap may end before they meet: such parts count as apart.
     """
-    mask, centre, reach = array(scenes.mask), array(scenes.centre.double()), array(scenes.reach.double())
+    mask, centre = array(scenes.mask), array(scenes.centre.double())
+    edges = array(scenes.rotation.double()).swapaxes(-1, -2) * array(scenes.bounds.double())[..., None]
+    reach = np.abs(edges).sum(-2)
     low, high = centre - reach, centre + reach + within
     near = (low[:, :, None] <= high[:, None]).all(-1) & mask[:, :, None] & mask[:, None]
     near &= np.triu(near.swapaxes(1, 2), 1)
@@ -49,8 +52,13 @@ def touching(scenes: Batch, within: float) -> BoolArray:
     rows = table_of(scenes).reshape(*mask.shape, WIDTH)
     pairs = np.stack([rows[scene, first], rows[scene, second]], 1)
     pairs[..., CENTRE:ROTATION] = (pairs[..., CENTRE:ROTATION] - pairs[:, :1, CENTRE:ROTATION]).round(6) + 0.0
-    different, number = np.unique(pairs, axis=0, return_inverse=True)  # copies of a pair are compared once
-    gap = np.empty(len(different))
-    kernels.gaps(different.reshape(-1, WIDTH), ROUNDS, within, gap)
+    # Copies of a pair are compared once.
+    different, index, number = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    boxes, start = OrientedBoxes(centre.reshape(-1, 3), edges.reshape(-1, 3, 3)), scene[index] * mask.shape[1]
+    gap = gaps(boxes, start + first[index], start + second[index])  # at most that of the parts inside
+    close = gap <= within
+    exact = np.empty(np.count_nonzero(close))
+    kernels.gaps(different[close].reshape(-1, WIDTH), ROUNDS, within, exact)
+    gap[close] = exact
     near[scene, first, second] = (gap <= within)[number.reshape(-1)]
     return near

@@ -21,13 +21,13 @@ from statistics import median
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.obj"))
 
 
-def row(name, value, unit, better, bound=None):
+def row(name: str, value: float, unit: str, better: str, bound: float | None = None) -> None:
     print(
         json.dumps({"name": name, "value": round(value, 4), "unit": unit, "better": better, "bound": bound}), flush=True
     )
 
 
-def seconds(*command, runs=5):
+def seconds(*command: str, runs: int = 5) -> float:
     """Median time of a whole process."""
     taken = []
     for _ in range(runs):
@@ -37,7 +37,7 @@ def seconds(*command, runs=5):
     return median(taken)
 
 
-def main():
+def main() -> None:
     row("shapeprog --help", seconds("-m", "shapeprog", "--help"), "s", "lower", 0.4)
     row("import shapeprog", seconds("-c", "import shapeprog"), "s", "lower", 1.5)
     row("import torch", seconds("-c", "import torch"), "s", "lower")
@@ -52,25 +52,25 @@ def main():
 
     prepare_kernels(cells=True)
     load(EXAMPLES[0])
-    times, found = [], []
+    times, results = [], []
     for path in EXAMPLES:
         started = time.perf_counter()
         shape = load(path)
         result = infer(shape, statements="paper")
         times.append(time.perf_counter() - started)
-        found.append((shape, result))
+        results.append((shape, result))
     row("infer, median of the example meshes", median(times), "s", "lower", 4.0)
     row("infer, slowest of the example meshes", max(times), "s", "lower")
     row("memory, peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, "GB", "lower", 1.5)
     with tempfile.TemporaryDirectory() as folder:
         drawn = []
-        for shape, result in [found[0], *found]:  # the first loads kernels and fonts
+        for shape, result in [results[0], *results]:  # the first loads kernels and fonts
             started = time.perf_counter()
             picture(shape, result.program, Path(folder) / "one.png")
             drawn.append(time.perf_counter() - started)
         row("one picture, median", median(drawn[1:]), "s", "lower", 1.0)
         started = time.perf_counter()
-        contact_sheet([Item(s.name, s, r.program) for s, r in found[:24]], Path(folder) / "sheet.png")
+        contact_sheet([Item(s.name, s, r.program) for s, r in results[:24]], Path(folder) / "sheet.png")
         row("contact sheet of 24", time.perf_counter() - started, "s", "lower", 10.0)
 
 

@@ -15,6 +15,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,9 @@ from shapeprog.language import Code, Draw, Loop, Program, encode, unroll
 POINTS = 5000
 
 
+Work = Callable[[], torch.Tensor]
+
+
 class Time(NamedTuple):
     wall: float
     cpu: float
@@ -47,6 +51,14 @@ def clock(work: Callable[[], object], repeat: int = 7, warm: bool = True) -> Tim
         work()
         walls.append(time.perf_counter() - begin)
     return Time(min(walls), (time.process_time() - start) / repeat)
+
+
+def slopes(work: Work, leaves: list[torch.Tensor]) -> tuple[torch.Tensor, ...]:
+    return torch.autograd.grad(work(), leaves)
+
+
+def mean_distance(scene: Scene, points: torch.Tensor) -> torch.Tensor:
+    return signed_distance(scene, points).mean()
 
 
 def report(
@@ -111,11 +123,11 @@ def turned(name: str, count: int, seed: int = 0, batch: int = 1) -> tuple[Scene,
     size = torch.rand(batch, count, 4, generator=g) * 3 + 0.3
     if name == "cuboid":
         size[..., 3] = 0  # upright, as most are
-    leaves = [size, torch.rand(batch, count, 3, generator=g) * 24 - 12]
-    leaves.append(torch.linalg.qr(torch.randn(batch, count, 3, 3, generator=g))[0])
-    leaves = [leaf.requires_grad_() for leaf in leaves]
+    centre = torch.rand(batch, count, 3, generator=g) * 24 - 12
+    rotation = torch.linalg.qr(torch.randn(batch, count, 3, 3, generator=g))[0]
+    leaves = [leaf.requires_grad_() for leaf in (size, centre, rotation)]
     none = torch.zeros(batch, count, dtype=torch.long)
-    return Scene(none + KINDS[name], *leaves, none == 0, none, none, none), leaves
+    return Scene(none + KINDS[name], size, centre, rotation, none == 0, none, none, none), leaves
 
 
 # ---------------------------------------------------------------- rows
@@ -232,7 +244,7 @@ def bench_distance() -> None:
     def pairs(points: torch.Tensor) -> torch.Tensor:
         return each_distance(scene, points).min(-1)[0]
 
-    rows = {
+    rows: dict[str, tuple[Work, Work]] = {
         f"coverage {POINTS} x 64 turned boxes": (
             lambda: coverage(scene, target).sum(), lambda: pairs(target).clamp(min=0).mean(),
         ),
@@ -241,10 +253,9 @@ def bench_distance() -> None:
         ),
     }  # fmt: skip
     for name, (fast, slow) in rows.items():
-        for got, expected in zip(torch.autograd.grad(fast(), leaves), torch.autograd.grad(slow(), leaves), strict=True):
+        for got, expected in zip(slopes(fast, leaves), slopes(slow, leaves), strict=True):
             assert float((got - expected).abs().max()) < 1e-5
-        took = clock(lambda work=fast: torch.autograd.grad(work(), leaves))
-        eager = clock(lambda work=slow: torch.autograd.grad(work(), leaves), 3)
+        took, eager = clock(partial(slopes, fast, leaves)), clock(partial(slopes, slow, leaves), 3)
         report(f"{name}, forward + backward", took, 1e3, "ms", "eager over all pairs", eager)
 
 
@@ -259,15 +270,14 @@ def bench_primitives(batch: int) -> None:
             sample = sample_surface(scene, POINTS, torch.Generator().manual_seed(0))
             return ((sample.points**2).sum(-1) * sample.weights).mean()
 
-        rows = {
-            "distance of 5000 points, forward + backward": lambda s=scene: signed_distance(s, target).mean(),
+        rows: dict[str, Work] = {
+            "distance of 5000 points, forward + backward": partial(mean_distance, scene, target),
             "5000 surface points, forward + backward": surface,
-            "cells at 32^3": lambda s=scene: rasterise(s),
-            "cells at 128^3": lambda s=scene: rasterise(s, 128),
+            "cells at 32^3": partial(rasterise, scene),
+            "cells at 128^3": partial(rasterise, scene, 128),
         }
         for what, work in rows.items():
-            grad = "backward" in what
-            took = clock(lambda work=work, of=leaves: torch.autograd.grad(work(), of) if grad else work())  # noqa: B023
+            took = clock(partial(slopes, work, leaves) if "backward" in what else work)
             cuboid.setdefault(what, took)
             report(f"{name}, 20 of them: {what}", took, 1e3 / batch, "ms/scene", "as many cuboids", cuboid[what])
 

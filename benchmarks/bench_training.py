@@ -40,7 +40,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 def pretraining(generator: Generator, batch: TeacherForcingBatch) -> float:
     """Seconds of a step of pretraining."""
-    generator.train().to(memory_format=torch.channels_last_3d)
+    generator.train().to(memory_format=torch.channels_last_3d)  # type: ignore[call-overload]
     optimiser = torch.optim.Adam(generator.parameters(), 1e-4)
 
     def step() -> None:
@@ -55,7 +55,8 @@ def pretraining(generator: Generator, batch: TeacherForcingBatch) -> float:
 def single_pass(generator: Generator, batch: TeacherForcingBatch) -> float:
     """Seconds of decoding programs of ten blocks by arg-max."""
     generator.eval()
-    last = generator.inner_net.logit2 if isinstance(generator, Tian2019) else generator.id_head[2]
+    last = generator.inner_net.logit2 if isinstance(generator, Tian2019) else generator.id_head[2]  # type: ignore[index]
+    assert isinstance(last, torch.nn.Linear)
     with torch.no_grad():
         last.bias[0] -= 20
 

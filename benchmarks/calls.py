@@ -160,7 +160,7 @@ def _apart(text: str) -> tuple[list[Any], Any]:
 
 def called(program: Any) -> list[tuple[str, Any]]:
     """The parts of a program as it is written: which function is called, if any, and the scene of what is drawn."""
-    from shapeprog.language.ast import Assignment, Call, Comment, Function, body_of
+    from shapeprog.language.ast import Assignment, Call, Comment, Function, Line, body_of
     from shapeprog.language.evaluate import expanded
     from shapeprog.language.printer import source_of
     from shapeprog.language.program import Program
@@ -172,7 +172,7 @@ def called(program: Any) -> list[tuple[str, Any]]:
     found = []
     for line in lines:
         if not isinstance(line, Assignment | Function | Comment):
-            inner = line
+            inner: Line = line
             while len(body_of(inner)) == 1:
                 (inner,) = body_of(inner)
             found.append(

@@ -51,8 +51,8 @@ def measure(task: tuple[Path, int, str, int]) -> dict[str, Any]:
     scene = unroll(program)
     block = scene.block[nearest_primitive(scene, torch.from_numpy(shape.points))[0]].numpy()
     counted = [
-        (chain[-1].word, np.bincount(labels[block == place], minlength=len(names)).tolist())
-        for place, chain in enumerate(program.chains)
+        (draw.word, np.bincount(labels[block == index], minlength=len(names)).tolist())
+        for index, draw in enumerate(program.draws)
     ]
     return {
         "name": shape.name, "number": number, "method": method, "seed": seed, "labels": names, "counted": counted,

@@ -19,7 +19,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -68,13 +68,15 @@ def measure(task: Task) -> list[dict[str, Any]]:
         started = time.monotonic()
         fine = refined(boxes, torch.from_numpy(np.asarray(shape.points)), seed=seed)
         keep(REFINED, fine, boxes, time.monotonic() - started)
-    for method, statements in ((SEARCH, "paper"), (EVERY, "all")):
+    settings: list[tuple[str, Literal["paper", "all"]]] = [(SEARCH, "paper"), (EVERY, "all")]
+    for method, statements in settings:
         if method not in methods:
             continue
         before = time.thread_time()
         result = infer(shape, blocks=blocks, seed=seed, budget=math.inf, statements=statements, ties=False)
         keep(method, result.program, result.snapped, result.seconds, time.thread_time() - before)
-        if method == SEARCH and ALONE in methods and shape.points is not None:  # the same structure
+        if method == SEARCH and ALONE in methods and shape.points is not None and result.snapped is not None:
+            # The same structure.
             alone = refined(result.snapped, torch.from_numpy(points_of_cells(shape.voxels)), seed=seed)
             keep(ALONE, alone, result.snapped, result.seconds)
     return rows

@@ -170,7 +170,7 @@ def given(task: Task) -> tuple[list[Any], Any]:
     mesh = whole([Triangles(*part) for part in parts])
     axes = axes_of(task.files[0], "+y", "-z" if task.set in ("bench", "cabinet") else None)
     if task.set in ("noisy", "open"):
-        cloud = scanned(sample_surface(*mesh.values(), SCANNED, task.seed).astype(np.float64), task)
+        cloud = scanned(sample_surface(mesh["vertices"], mesh["faces"], SCANNED, task.seed).astype(np.float64), task)
         return parts, shape_from_points(cloud, name=task.name, axes=axes, seed=task.seed)
     surface = fused(**mesh) if task.set == "fused" else mesh.values()
     return parts, shape_from_mesh(*surface, name=task.name, axes=axes, seed=task.seed)

@@ -303,9 +303,9 @@ def kinds_tied(program: Any) -> tuple[int, int]:
         for key, argument in line.keywords:
             inner = argument.keywords if isinstance(argument, Point) else [(key, argument)]
             for word, value in inner:
-                for each in value if isinstance(value, tuple) else (value,):
-                    if isinstance(each, Name):
-                        uses.setdefault(each.name, []).append((kinds.get(word, word), word, dict(line.keywords)))
+                for number in value if isinstance(value, tuple) else (value,):
+                    if isinstance(number, Name):
+                        uses.setdefault(number.name, []).append((kinds.get(word, word), word, dict(line.keywords)))
     mixed = 0
     for each in uses.values():
         names = {"clearance" if kind in ("low", "high") else kind for kind, _, _ in each}
@@ -480,7 +480,7 @@ def of_chair(task: Task) -> dict[str, Any]:
 
 def boxes_of(pack: Path, number: int) -> tuple[list[Any], Any]:
     """The boxes of the parts of a chair in the grid, and the group of copies (B,) that each is of."""
-    from shapeprog.evaluation.parts import Box
+    from shapeprog.language.hints import Box
     from shapeprog.space import Frame
 
     with np.load(pack.with_name(f"{pack.stem}_boxes.npz")) as data:

@@ -51,6 +51,8 @@ def measure(file: Path) -> dict[str, Any]:
     started = time.process_time()
     found = sp.infer(shape, unit=unit).program
     seconds = time.process_time() - started
+    assert shape.vertices is not None
+    assert shape.faces is not None
     target = components(shape.vertices, shape.faces)
     corners, first = target.vertices[target.faces].reshape(-1, 3), 3 * target.start[:-1]
     boxes = np.concatenate([np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)], 1)

@@ -65,6 +65,8 @@ box(at=(2.1, 1, 1), size=(2, 2, 2))
 cylinder(at=(0, 2, 2), height=4.01, radius=1)
 """))  # fmt: skip
     assert room.hidden_groups(scene, scene.block) == {2, 4}
+    nothing = unroll(parse(""))
+    assert room.hidden_groups(nothing, nothing.block) == set()
 
 
 def test_two_overlapping_cubes_show_their_exact_areas():

@@ -342,6 +342,10 @@ def test_noise_is_a_program_of_finite_numbers():
     assert all(np.isfinite(node.values).all() for node in found.program.walk())
 
 
+def test_where_nothing_is_worth_its_price_the_program_is_empty():
+    assert sp.infer(EXAMPLES / "chair_kenney.obj", detail=1e-4).program.size == 0
+
+
 def test_inference_tells_what_it_explains_and_what_more_would_cost():
     shape = whole(SPLAYED)
     found = sp.infer(shape)

@@ -117,6 +117,8 @@ sample = sample_surface  # its public name, shapeprog.sample
 
 def hidden_groups(batch: Batch, group: Int[Tensor, " N"]) -> set[int]:
     """The groups of primitives of one scene whose surface lies inside others, or at most ``TOUCHING`` outside."""
+    if not face_areas(batch.flatten()).any():
+        return set()
     shown = sample_surface(batch, SHOWN, torch.Generator().manual_seed(0))
     away, owner = each_distance(batch, shown.points), group[shown.slot]
     visible = away.masked_fill(group == owner[:, None], math.inf).amin(1) > TOUCHING

@@ -10,7 +10,7 @@ import numpy as np
 from shapeprog.geometry import distance_kernels as kernels
 from shapeprog.geometry.arrays import array, table_of
 from shapeprog.geometry.batch import Batch
-from shapeprog.geometry.separation import OrientedBoxes, gaps
+from shapeprog.geometry.separation import OrientedBoxes, boxes_of, gaps
 from shapeprog.kernels.table import CENTRE, ROTATION, WIDTH
 from shapeprog.space import Array, BoolArray, IntArray
 
@@ -42,8 +42,7 @@ def touching(scenes: Batch, within: float) -> BoolArray:
 
     Projections of parts that barely overlap may end before they meet: such parts count as apart.
     """
-    mask, centre = array(scenes.mask), array(scenes.centre.double())
-    edges = array(scenes.rotation.double()).swapaxes(-1, -2) * array(scenes.bounds.double())[..., None]
+    mask, (centre, edges) = array(scenes.mask), boxes_of(scenes)
     reach = np.abs(edges).sum(-2)
     low, high = centre - reach, centre + reach + within
     near = (low[:, :, None] <= high[:, None]).all(-1) & mask[:, :, None] & mask[:, None]
@@ -55,7 +54,7 @@ def touching(scenes: Batch, within: float) -> BoolArray:
     # Copies of a pair are compared once.
     different, index, number = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
     boxes, start = OrientedBoxes(centre.reshape(-1, 3), edges.reshape(-1, 3, 3)), scene[index] * mask.shape[1]
-    gap = gaps(boxes, start + first[index], start + second[index])  # at most that of the parts inside
+    gap = gaps(boxes, start + first[index], start + second[index])  # a lower bound of the gap between the parts
     close = gap <= within
     exact = np.empty(np.count_nonzero(close))
     kernels.gaps(different[close].reshape(-1, WIDTH), ROUNDS, within, exact)

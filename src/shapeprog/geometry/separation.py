@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shapeprog.geometry.arrays import array
+from shapeprog.geometry.batch import Batch
 from shapeprog.space import Array, FloatArray
 
 
@@ -15,6 +17,12 @@ class OrientedBoxes(NamedTuple):
 
     centre: FloatArray
     edges: FloatArray
+
+
+def boxes_of(batch: Batch) -> OrientedBoxes:
+    """The boxes around the primitives of a batch, in the grid frame and in double precision."""
+    edges = array(batch.rotation.double()).swapaxes(-1, -2) * array(batch.bounds.double())[..., None]
+    return OrientedBoxes(array(batch.centre.double()), edges)
 
 
 MOST_PAIRS = 20_000

@@ -35,7 +35,7 @@ from shapeprog.kernels.table import WIDTH
 from shapeprog.space import Array
 
 SKIN = 1e-3  # how far in cells off the surface a point is looked at to see whether it is hidden
-SHOWN = 4096  # points of the visible surface that tell which groups it shows
+VISIBLE_SAMPLES = 4096  # points drawn on the visible surface to detect hidden groups
 PATIENCE = 64  # candidates drawn for each point wanted before a scene is given up
 
 
@@ -116,11 +116,14 @@ sample = sample_surface  # its public name, shapeprog.sample
 
 
 def hidden_groups(batch: Batch, group: Int[Tensor, " N"]) -> set[int]:
-    """The groups of primitives of one scene whose surface lies inside others, or at most ``TOUCHING`` outside."""
+    """The groups (N,) of primitives of one scene whose surface lies inside other groups, to within ``TOUCHING``.
+
+    A scene without a surface has none.
+    """
     if not face_areas(batch.flatten()).any():
         return set()
-    shown = sample_surface(batch, SHOWN, torch.Generator().manual_seed(0))
-    away, owner = each_distance(batch, shown.points), group[shown.slot]
+    sample = sample_surface(batch, VISIBLE_SAMPLES, torch.Generator().manual_seed(0))
+    away, owner = each_distance(batch, sample.points), group[sample.slot]
     visible = away.masked_fill(group == owner[:, None], math.inf).amin(1) > TOUCHING
     return {*group.tolist()} - {*owner[visible].tolist()}
 

@@ -145,11 +145,11 @@ def _pruned(program: Program, coverage: Coverage) -> Program:
     table, every, scene = coverage.table(program.body), tuple(range(program.blocks)), unroll(program)
     hidden = hidden_groups(scene, scene.block)
     fewer = [(every[:index] + every[index + 1 :], index in hidden) for index in every]
-    worth = [rest for rest, unseen in fewer if unseen or value(table, rest) > value(table, every)]
-    for rest in sorted(worth, key=partial(value, table), reverse=True):
-        left = Program(tuple(program.body[index] for index in rest))
-        if len(floating(connected(left, coverage))) <= len(floating(connected(program, coverage))):
-            return _pruned(left, coverage)
+    better = [rest for rest, unseen in fewer if unseen or value(table, rest) > value(table, every)]
+    for rest in sorted(better, key=partial(value, table), reverse=True):
+        shorter_program = Program(tuple(program.body[index] for index in rest))
+        if len(floating(connected(shorter_program, coverage))) <= len(floating(connected(program, coverage))):
+            return _pruned(shorter_program, coverage)
     return program
 
 

@@ -79,5 +79,5 @@ def _reaching(chain: Chain, original: Box, copies: list[Box], parts: list[Box]) 
             along = (longer.centre - copy.centre) @ copy.rotation
             for moved in (along, -along):  # at a mirrored copy the other end may be extended
                 box = Box(original.centre + original.rotation @ moved, original.rotation, longer.half)
-                for each in (box, *centred(box)):
-                    yield from redrawn(chain, each)
+                for candidate in (box, *centred(box)):
+                    yield from redrawn(chain, candidate)

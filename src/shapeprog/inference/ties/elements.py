@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from shapeprog.geometry import separation
 from shapeprog.geometry.scene import Scene
 from shapeprog.geometry.separation import OrientedBoxes
 
@@ -55,5 +56,4 @@ class Slot(NamedTuple):
 
 def boxes_of(scene: Scene) -> OrientedBoxes:
     """The boxes around the primitives of a scene (N,), for a person in front: to the right, to the rear, upwards."""
-    edges = scene.rotation.transpose(-1, -2) * scene.bounds[..., None]
-    return OrientedBoxes(*(vectors.numpy()[..., ::-1] * [-1, 1, 1] for vectors in (scene.centre, edges)))
+    return OrientedBoxes(*(vectors[..., ::-1] * [-1, 1, 1] for vectors in separation.boxes_of(scene)))

@@ -52,7 +52,7 @@ def tie(
     """The same program placed from the sides, with names for shared numbers; the same for the same seed.
 
     Numbers are tied at lower prices where more than ``TIES.lost`` of the closeness of the surfaces is lost.  Parts that
-    ties hide in others are left out.  The same program comes back if a statement has no placed form.
+    are hidden inside others once tied are left out.  The same program comes back if a statement has no placed form.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def tie(
                 break
     scene = unroll(tied)
     if not (known or held) and (hidden := hidden_groups(scene, scene.block)):
-        shown = [nest(chain) for index, chain in enumerate(tied.chains) if index != max(hidden)]
-        return tie(Program(tuple(shown)), evidence, price=price, floor=floor, seed=seed)
+        visible = [nest(chain) for index, chain in enumerate(tied.chains) if index != max(hidden)]
+        return tie(Program(tuple(visible)), evidence, price=price, floor=floor, seed=seed)
     return tied
 
 
